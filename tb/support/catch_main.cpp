@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Catch2 2 needs one translation unit with its main; Catch2 3 brings a library.
+// main() of every test program with Catch2 2; version 3 brings its own as a library.
 #define CATCH_CONFIG_MAIN
 #include <catch2/catch.hpp>
