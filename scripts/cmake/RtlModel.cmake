@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+# VHDL entity + generics -> Verilated C++ library.
+#
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE])
+#     Static library <name> with header V<name>.h (class V<name>) for entity rtl/<entity>.vhd. TRACE: the model can
+#     write FST waves (costs nothing until a file is opened, but longer compilation).
+#   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
+#     ctest case: elaboration with these generics has to fail, and the message has to match.
+#
+# rtl/files.f is the one compile order: paths relative to rtl/, '#' starts a comment. A model depends on the files up
+# to and including its own entity, and is Verilated again only if the Verilog text that GHDL makes of them changes.
+#
+# Verilator's own verilate() runs at configure time, when the Verilog does not exist yet; and its Makefile would need
+# make and Python. So Verilator only writes C++ here, and CMake compiles that (with its jobs, its ccache).
+find_program(PSWEEP_GHDL ghdl REQUIRED)
+find_program(PSWEEP_VERILATOR verilator REQUIRED)
+find_package(ZLIB)
+execute_process(
+  COMMAND ${PSWEEP_VERILATOR} --getenv VERILATOR_ROOT
+  OUTPUT_VARIABLE PSWEEP_VERILATOR_ROOT
+  OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+
+set(PSWEEP_VHDL_STANDARD --std=93c)
+set(PSWEEP_RTL_MODEL_DIR ${CMAKE_CURRENT_LIST_DIR})
+# -Wall and every warning is an error. DECLFILENAME: the file is called after the top entity only. COMBDLY: GHDL writes
+# dynamic reads as 'always @* x <= ..', which is harmless. CASEINCOMPLETE stays fatal: it is the only alarm for the
+# 'others' branches that GHDL 2.0 loses.
+set(PSWEEP_VERILATOR_FLAGS -Wall -Wno-DECLFILENAME -Wno-COMBDLY -O3 --x-initial unique --x-assign unique)
+
+# The run-time library comes with Verilator as source.
+add_library(verilated_rt STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated.cpp
+                                ${PSWEEP_VERILATOR_ROOT}/include/verilated_threads.cpp)
+target_include_directories(verilated_rt SYSTEM PUBLIC ${PSWEEP_VERILATOR_ROOT}/include
+                                                      ${PSWEEP_VERILATOR_ROOT}/include/vltstd)
+target_compile_definitions(verilated_rt PUBLIC VM_COVERAGE=0 VM_SC=0)
+target_link_libraries(verilated_rt PUBLIC Threads::Threads)
+if(ZLIB_FOUND)
+  add_library(verilated_rt_fst STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated_fst_c.cpp)
+  target_compile_definitions(verilated_rt_fst PUBLIC VM_TRACE=1 VM_TRACE_FST=1)
+  target_compile_options(verilated_rt_fst PRIVATE -w)  # not ours
+  target_link_libraries(verilated_rt_fst PUBLIC verilated_rt ZLIB::ZLIB)
+else()
+  message(STATUS "psweep: zlib not found, models are built without waves")
+endif()
+
+# Files of rtl/files.f up to and including <entity>.vhd, as absolute paths in `out`.
+function(psweep_rtl_sources entity out)
+  set(list_file ${CMAKE_SOURCE_DIR}/rtl/files.f)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list_file})
+  file(STRINGS ${list_file} lines REGEX "^[^#]")
+  set(sources)
+  foreach(line IN LISTS lines)
+    string(STRIP "${line}" line)
+    if(line STREQUAL "")
+      continue()
+    endif()
+    list(APPEND sources ${CMAKE_SOURCE_DIR}/rtl/${line})
+    get_filename_component(unit ${line} NAME_WE)
+    if(unit STREQUAL entity)
+      set(${out} ${sources} PARENT_SCOPE)
+      return()
+    endif()
+  endforeach()
+  message(FATAL_ERROR "rtl/files.f has no file ${entity}.vhd")
+endfunction()
+
+function(rtl_model name)
+  cmake_parse_arguments(A "TRACE" "TOP" "GENERICS" ${ARGN})
+  psweep_rtl_sources(${A_TOP} sources)
+  set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
+  set(obj ${dir}/obj)
+  file(MAKE_DIRECTORY ${dir})
+  list(TRANSFORM A_GENERICS PREPEND -g)
+  set(trace_flag)
+  if(A_TRACE AND ZLIB_FOUND)
+    set(trace_flag --trace-fst)
+  endif()
+
+  # copy_if_different: the Verilog keeps its time stamp where a change of the VHDL means nothing to this model.
+  add_custom_command(
+    OUTPUT ${dir}/${A_TOP}.v
+    COMMAND ${PSWEEP_GHDL} -a ${PSWEEP_VHDL_STANDARD} --workdir=${dir} ${sources}
+    COMMAND ${PSWEEP_GHDL} --synth ${PSWEEP_VHDL_STANDARD} --workdir=${dir} ${A_GENERICS} --out=verilog ${A_TOP} >
+            ${dir}/raw.v
+    COMMAND ${CMAKE_COMMAND} -E copy_if_different ${dir}/raw.v ${dir}/${A_TOP}.v
+    DEPENDS ${sources}
+    COMMENT "GHDL ${name}"
+    VERBATIM)
+  set(header ${obj}/V${name}.h)
+  set(fast ${obj}/V${name}__fast.cxx)
+  set(slow ${obj}/V${name}__slow.cxx)
+  add_custom_command(
+    OUTPUT ${header} ${fast} ${slow}
+    COMMAND ${CMAKE_COMMAND} -E rm -rf ${obj}
+    COMMAND ${PSWEEP_VERILATOR} --cc ${PSWEEP_VERILATOR_FLAGS} ${trace_flag} --prefix V${name} --Mdir ${obj}
+            --top-module ${A_TOP} ${dir}/${A_TOP}.v
+    COMMAND ${CMAKE_COMMAND} -D OBJ=${obj} -D FAST=${fast} -D SLOW=${slow} -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
+    DEPENDS ${dir}/${A_TOP}.v ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
+    COMMENT "Verilator ${name}"
+    VERBATIM)
+
+  add_library(${name} STATIC ${fast} ${slow} ${header})
+  # Constructors and reset code run once: compiling them without optimisation halves the build.
+  set_source_files_properties(${fast} PROPERTIES COMPILE_OPTIONS "-O3")
+  set_source_files_properties(${slow} PROPERTIES COMPILE_OPTIONS "-O0")
+  target_compile_options(${name} PRIVATE -w)  # generated code
+  target_include_directories(${name} SYSTEM PUBLIC ${obj})
+  if(trace_flag)
+    target_link_libraries(${name} PUBLIC verilated_rt_fst)
+  else()
+    target_link_libraries(${name} PUBLIC verilated_rt)
+  endif()
+endfunction()
+
+function(rtl_must_not_elaborate test)
+  cmake_parse_arguments(A "" "TOP;MESSAGE" "GENERICS" ${ARGN})
+  psweep_rtl_sources(${A_TOP} sources)
+  list(TRANSFORM A_GENERICS PREPEND -g)
+  string(REPLACE ";" "|" sources "${sources}")
+  string(REPLACE ";" "|" generics "${A_GENERICS}")
+  add_test(
+    NAME ${test}
+    COMMAND
+      ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
+      SOURCES=${sources} -D GENERICS=${generics} -D MESSAGE=${A_MESSAGE} -D
+      DIR=${CMAKE_CURRENT_BINARY_DIR}/must_not_elaborate/${test} -P ${PSWEEP_RTL_MODEL_DIR}/MustNotElaborate.cmake)
+  set_tests_properties(${test} PROPERTIES LABELS unit)
+endfunction()
