@@ -1,0 +1,3 @@
+psweep_pkg.vhd
+ram_sdp.vhd
+stream_reg.vhd

@@ -1,0 +1,69 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- psweep_pkg: constants and helpers shared by all entities of the engine.
+--   Formats   : positions sfix(13,19) in 32 bits, steps ufix(2,19) in 21 bits    (docs/interfaces.md)
+--   Latencies : clocks from an entity's input to its output; parents add them up, sw/golden/control.hpp mirrors them
+--   Golden    : sw/golden/config.hpp (formats), sw/golden/control.hpp (states, errors, latencies)
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+
+package psweep_pkg is
+
+  -- Positions and steps.
+  constant C_POS_W    : positive := 32;
+  constant C_POS_FRAC : positive := 19;
+  constant C_INT_W    : positive := C_POS_W - C_POS_FRAC; -- integer part, signed
+  constant C_STEP_W   : positive := 21;
+  -- A row takes at least this many clocks: the table words of a row are fetched one a clock, and the feedback loops of
+  -- column sums and map close in time.
+  constant C_ROW_MIN  : positive := 8;
+
+  -- Control states, as on port state.
+  constant C_STATE_IDLE   : std_logic_vector(2 downto 0) := "000";
+  constant C_STATE_LOAD   : std_logic_vector(2 downto 0) := "001";
+  constant C_STATE_SWEEP  : std_logic_vector(2 downto 0) := "010";
+  constant C_STATE_FLUSH  : std_logic_vector(2 downto 0) := "011";
+  constant C_STATE_UNLOAD : std_logic_vector(2 downto 0) := "100";
+  constant C_STATE_DRAIN  : std_logic_vector(2 downto 0) := "101";
+
+  -- Bits of port errors.
+  constant C_ERROR_CONFIG  : natural := 0;
+  constant C_ERROR_TABLE   : natural := 1;
+  constant C_ERROR_SHORT   : natural := 2;
+  constant C_ERROR_LONG    : natural := 3;
+  constant C_ERROR_WINDOW  : natural := 4;
+  constant C_ERROR_ADDRESS : natural := 5;
+  constant C_ERROR_BUSY    : natural := 6;
+
+  -- Latencies, first input to first output.
+  constant C_ADDRESS_LATENCY       : positive := 9; -- row strobe to position
+  constant C_STORAGE_LATENCY       : positive := 4; -- position to 2x2 pixels
+  constant C_INTERPOLATION_LATENCY : positive := 6; -- 2x2 pixels to sample
+
+  -- Bits that hold 0 .. n-1, at least 1.
+  function clog2 (n : positive) return positive;
+
+  function imax (a, b : integer) return integer;
+
+end package psweep_pkg;
+
+package body psweep_pkg is
+
+  function clog2 (n : positive) return positive is
+    variable v_bits : positive := 1;
+  begin
+    while 2 ** v_bits < n loop
+      v_bits := v_bits + 1;
+    end loop;
+    return v_bits;
+  end function clog2;
+
+  function imax (a, b : integer) return integer is
+  begin
+    if a > b then
+      return a;
+    end if;
+    return b;
+  end function imax;
+
+end package body psweep_pkg;
