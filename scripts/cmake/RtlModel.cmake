@@ -69,21 +69,20 @@ function(rtl_model name)
   psweep_rtl_sources(${A_TOP} sources)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
   set(obj ${dir}/obj)
-  file(MAKE_DIRECTORY ${dir})
   list(TRANSFORM A_GENERICS PREPEND -g)
   set(trace_flag)
   if(A_TRACE AND ZLIB_FOUND)
     set(trace_flag --trace-fst)
   endif()
 
-  # copy_if_different: the Verilog keeps its time stamp where a change of the VHDL means nothing to this model.
+  string(REPLACE ";" "|" source_list "${sources}")
+  string(REPLACE ";" "|" generic_list "${A_GENERICS}")
   add_custom_command(
     OUTPUT ${dir}/${A_TOP}.v
-    COMMAND ${PSWEEP_GHDL} -a ${PSWEEP_VHDL_STANDARD} --workdir=${dir} ${sources}
-    COMMAND ${PSWEEP_GHDL} --synth ${PSWEEP_VHDL_STANDARD} --workdir=${dir} ${A_GENERICS} --out=verilog ${A_TOP} >
-            ${dir}/raw.v
-    COMMAND ${CMAKE_COMMAND} -E copy_if_different ${dir}/raw.v ${dir}/${A_TOP}.v
-    DEPENDS ${sources}
+    COMMAND
+      ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
+      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -P ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
+    DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     COMMENT "GHDL ${name}"
     VERBATIM)
   set(header ${obj}/V${name}.h)

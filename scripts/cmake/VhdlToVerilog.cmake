@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+# cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> -P VhdlToVerilog.cmake
+# Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
+# Shows GHDL's messages if it fails or warns; its notes ("found RAM ..") are left out.
+string(REPLACE "|" ";" SOURCES "${SOURCES}")
+string(REPLACE "|" ";" GENERICS "${GENERICS}")
+file(MAKE_DIRECTORY ${DIR})
+function(run_ghdl)
+  cmake_parse_arguments(A "" "OUTPUT" "ARGS" ${ARGN})
+  execute_process(
+    COMMAND ${GHDL} ${A_ARGS}
+    RESULT_VARIABLE code
+    OUTPUT_FILE ${A_OUTPUT}
+    ERROR_VARIABLE text)
+  if(NOT code EQUAL 0)
+    message(FATAL_ERROR "ghdl ${TOP} ${GENERICS} failed:\n${text}")
+  elseif(text MATCHES ":(warning|error)")
+    message("${text}")
+  endif()
+endfunction()
+run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${SOURCES})
+run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
+file(COPY_FILE ${DIR}/raw.v ${DIR}/${TOP}.v ONLY_IF_DIFFERENT)
