@@ -85,6 +85,7 @@ function(rtl_model name)
     DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     COMMENT "GHDL ${name}"
     VERBATIM)
+  set(waivers ${PSWEEP_RTL_MODEL_DIR}/ghdl_netlist.vlt)
   set(header ${obj}/V${name}.h)
   set(fast ${obj}/V${name}__fast.cxx)
   set(slow ${obj}/V${name}__slow.cxx)
@@ -92,9 +93,9 @@ function(rtl_model name)
     OUTPUT ${header} ${fast} ${slow}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${obj}
     COMMAND ${PSWEEP_VERILATOR} --cc ${PSWEEP_VERILATOR_FLAGS} ${trace_flag} --prefix V${name} --Mdir ${obj}
-            --top-module ${A_TOP} ${dir}/${A_TOP}.v
+            --top-module ${A_TOP} ${waivers} ${dir}/${A_TOP}.v
     COMMAND ${CMAKE_COMMAND} -D OBJ=${obj} -D FAST=${fast} -D SLOW=${slow} -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
-    DEPENDS ${dir}/${A_TOP}.v ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
+    DEPENDS ${dir}/${A_TOP}.v ${waivers} ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
     COMMENT "Verilator ${name}"
     VERBATIM)
 
