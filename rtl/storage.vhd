@@ -1,0 +1,329 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- storage: the loaded windows of both images, four banks each, interleaved by the parities of x and y, so that any
+--          2x2 neighbourhood is read in one clock (paper, section 4.2.1, equation 2).
+--   Rate     : one sample (2x2 pixels of each image) per clock; writes: one pixel of each image per clock
+--   Latency  : C_STORAGE_LATENCY = 4 clocks from s_* to m_*
+--   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator
+--   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W) passed through
+--   Unusable : a sample that is not usable in x and y reads address 0; its pixels mean nothing
+--   Reset    : clears m_valid's way; memories and data have no reset
+--   Golden   : sw/golden/storage.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity storage is
+  generic (
+    G_IMG_COLS : integer := 340;
+    G_IMG_ROWS : integer := 144;
+    G_PIX_W    : integer := 8;
+    G_WEIGHT_W : integer := 8
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    -- Window in raster order, left pixel in the low half. load_clear: the next pixel is the first one.
+    load_clear   : in  std_logic;
+    load_valid   : in  std_logic;
+    load_col     : in  std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
+    load_row_odd : in  std_logic;
+    load_row_end : in  std_logic;
+    load_data    : in  std_logic_vector(2 * G_PIX_W - 1 downto 0);
+
+    -- As address_generator's m_*: s_yi_*, s_fy_* and s_row_* change at most with s_row_first.
+    s_valid          : in  std_logic;
+    s_row_first      : in  std_logic;
+    s_plane_first    : in  std_logic;
+    s_plane_last     : in  std_logic;
+    s_usable_x       : in  std_logic;
+    s_usable_y       : in  std_logic;
+    s_xi_left        : in  std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0); -- low bits of xi
+    s_yi_odd_left    : in  std_logic; -- bit 0 of yi
+    s_fx_left        : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    s_fy_left        : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    s_xi_right       : in  std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
+    s_yi_odd_right   : in  std_logic;
+    s_fx_right       : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    s_fy_right       : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    s_row_even_left  : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_odd_left   : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_even_right : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_odd_right  : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+
+    -- p10 is the right neighbour of p00, p01 the one below. m_fy_* hold for a row, like s_fy_*.
+    m_valid       : out std_logic;
+    m_row_first   : out std_logic;
+    m_plane_first : out std_logic;
+    m_plane_last  : out std_logic;
+    m_usable_x    : out std_logic;
+    m_usable_y    : out std_logic;
+    m_fx_left     : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    m_fy_left     : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    m_fx_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    m_fy_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    m_p00_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p10_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p01_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p11_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p00_right   : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p10_right   : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p01_right   : out std_logic_vector(G_PIX_W - 1 downto 0);
+    m_p11_right   : out std_logic_vector(G_PIX_W - 1 downto 0)
+  );
+end entity storage;
+
+architecture rtl of storage is
+
+  constant C_PITCH  : integer := G_IMG_COLS / 2;
+  constant C_DEPTH  : integer := G_IMG_COLS / 2 * (G_IMG_ROWS / 2);
+  constant C_BANK_W : integer := clog2(C_DEPTH);
+  constant C_COL_W  : integer := clog2(G_IMG_COLS);
+
+  -- Load.
+  signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row pair being loaded
+  signal write_addr : std_logic_vector(C_BANK_W - 1 downto 0);
+  signal write_data : std_logic_vector(2 * G_PIX_W - 1 downto 0);
+  signal write_bank : std_logic_vector(3 downto 0); -- one-hot: 2 * (y mod 2) + x mod 2
+
+  -- Both images behind each other, the left one in the low half, so that one generate serves both.
+  signal s0_xi       : std_logic_vector(2 * C_COL_W - 1 downto 0);
+  signal s0_y_odd    : std_logic_vector(1 downto 0);
+  signal s0_row_even : std_logic_vector(2 * C_BANK_W - 1 downto 0);
+  signal s0_row_odd  : std_logic_vector(2 * C_BANK_W - 1 downto 0);
+  signal s0_unusable : std_logic;
+  signal s4_p00      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
+  signal s4_p10      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
+  signal s4_p01      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
+  signal s4_p11      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
+
+  -- Way of the strobes and of what belongs to a sample; index or prefix = stage.
+  signal valid       : std_logic_vector(3 downto 1);
+  signal row_first   : std_logic_vector(3 downto 1);
+  signal plane_first : std_logic_vector(3 downto 1);
+  signal plane_last  : std_logic_vector(3 downto 1);
+  signal usable_x    : std_logic_vector(3 downto 1);
+  signal usable_y    : std_logic_vector(3 downto 1);
+  signal s1_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  signal s2_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  signal s3_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  signal s1_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  signal s2_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  signal s3_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+
+  -- Address of the even (round_up = xi mod 2) or odd (round_up = 0) one of columns xi, xi+1. The increment enters as a
+  -- carry, from a bit that is cut off again, so this is one adder.
+  function bank_address (row_part : std_logic_vector; xi : std_logic_vector; round_up : std_logic)
+    return std_logic_vector is
+    variable v_column : unsigned(C_BANK_W - 1 downto 0);
+    variable v_sum    : unsigned(C_BANK_W downto 0);
+  begin
+    v_column := resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W);
+    v_sum    := unsigned(row_part & '1') + (v_column & round_up);
+    return std_logic_vector(v_sum(C_BANK_W downto 1));
+  end function bank_address;
+
+  -- The word of the bank whose y and x parities are given.
+  function pick (word_0, word_1, word_2, word_3 : std_logic_vector; y_odd, x_odd : std_logic)
+    return std_logic_vector is
+  begin
+    if y_odd = '0' and x_odd = '0' then
+      return word_0;
+    elsif y_odd = '0' then
+      return word_1;
+    elsif x_odd = '0' then
+      return word_2;
+    else
+      return word_3;
+    end if;
+  end function pick;
+
+begin
+
+  assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
+    report "storage: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    severity failure;
+  assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
+    report "storage: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    severity failure;
+  assert G_PIX_W >= 1 and G_PIX_W <= 12
+    report "storage: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    severity failure;
+  assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
+    report "storage: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    severity failure;
+
+  p_load : process (clk)
+  begin
+    if rising_edge(clk) then
+      write_addr    <= std_logic_vector(write_row + resize(unsigned(load_col(C_COL_W - 1 downto 1)), C_BANK_W));
+      write_data    <= load_data;
+      write_bank(0) <= load_valid and not load_row_odd and not load_col(0);
+      write_bank(1) <= load_valid and not load_row_odd and load_col(0);
+      write_bank(2) <= load_valid and load_row_odd and not load_col(0);
+      write_bank(3) <= load_valid and load_row_odd and load_col(0);
+      if load_clear = '1' then
+        write_row <= (others => '0');
+      elsif load_valid = '1' and load_row_end = '1' and load_row_odd = '1' then
+        write_row <= write_row + C_PITCH;
+      end if;
+      if rst = '1' then
+        write_bank <= (others => '0');
+      end if;
+    end if;
+  end process p_load;
+
+  s0_xi       <= s_xi_right & s_xi_left;
+  s0_y_odd    <= s_yi_odd_right & s_yi_odd_left;
+  s0_row_even <= s_row_even_right & s_row_even_left;
+  s0_row_odd  <= s_row_odd_right & s_row_odd_left;
+  s0_unusable <= not (s_usable_x and s_usable_y);
+
+  g_image : for n in 0 to 1 generate
+    signal row_even    : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal row_odd     : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal xi          : std_logic_vector(C_COL_W - 1 downto 0);
+    signal write_pixel : std_logic_vector(G_PIX_W - 1 downto 0);
+    -- s1: addresses of the four banks.
+    signal s1_addr_0 : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal s1_addr_1 : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal s1_addr_2 : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal s1_addr_3 : std_logic_vector(C_BANK_W - 1 downto 0);
+    -- s2, s3: inside the RAMs; their words, and the parities of the sample.
+    signal s3_word_0 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal s3_word_1 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal s3_word_2 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal s3_word_3 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal x_odd     : std_logic_vector(3 downto 1);
+    signal y_odd     : std_logic_vector(3 downto 1);
+    -- s4: the quad.
+    signal s4_pixel_00 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal s4_pixel_10 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal s4_pixel_01 : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal s4_pixel_11 : std_logic_vector(G_PIX_W - 1 downto 0);
+  begin
+
+    row_even    <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
+    row_odd     <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
+    xi          <= s0_xi((n + 1) * C_COL_W - 1 downto n * C_COL_W);
+    write_pixel <= write_data((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+
+    p_read : process (clk)
+    begin
+      if rising_edge(clk) then
+        s1_addr_0 <= bank_address(row_even, xi, xi(0));
+        s1_addr_1 <= bank_address(row_even, xi, '0');
+        s1_addr_2 <= bank_address(row_odd, xi, xi(0));
+        s1_addr_3 <= bank_address(row_odd, xi, '0');
+        if s0_unusable = '1' then -- keeps addresses legal
+          s1_addr_0 <= (others => '0');
+          s1_addr_1 <= (others => '0');
+          s1_addr_2 <= (others => '0');
+          s1_addr_3 <= (others => '0');
+        end if;
+        x_odd       <= x_odd(2 downto 1) & xi(0);
+        y_odd       <= y_odd(2 downto 1) & s0_y_odd(n);
+        s4_pixel_00 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, y_odd(3), x_odd(3));
+        s4_pixel_10 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, y_odd(3), not x_odd(3));
+        s4_pixel_01 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, not y_odd(3), x_odd(3));
+        s4_pixel_11 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, not y_odd(3), not x_odd(3));
+      end if;
+    end process p_read;
+
+    u_bank_0 : entity work.ram_sdp
+      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+      port map (
+        clk   => clk,
+        we    => write_bank(0),
+        waddr => write_addr,
+        wdata => write_pixel,
+        raddr => s1_addr_0,
+        rdata => s3_word_0
+      );
+
+    u_bank_1 : entity work.ram_sdp
+      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+      port map (
+        clk   => clk,
+        we    => write_bank(1),
+        waddr => write_addr,
+        wdata => write_pixel,
+        raddr => s1_addr_1,
+        rdata => s3_word_1
+      );
+
+    u_bank_2 : entity work.ram_sdp
+      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+      port map (
+        clk   => clk,
+        we    => write_bank(2),
+        waddr => write_addr,
+        wdata => write_pixel,
+        raddr => s1_addr_2,
+        rdata => s3_word_2
+      );
+
+    u_bank_3 : entity work.ram_sdp
+      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+      port map (
+        clk   => clk,
+        we    => write_bank(3),
+        waddr => write_addr,
+        wdata => write_pixel,
+        raddr => s1_addr_3,
+        rdata => s3_word_3
+      );
+
+    s4_p00((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_00;
+    s4_p10((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_10;
+    s4_p01((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_01;
+    s4_p11((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_11;
+
+  end generate g_image;
+
+  m_p00_left  <= s4_p00(G_PIX_W - 1 downto 0);
+  m_p10_left  <= s4_p10(G_PIX_W - 1 downto 0);
+  m_p01_left  <= s4_p01(G_PIX_W - 1 downto 0);
+  m_p11_left  <= s4_p11(G_PIX_W - 1 downto 0);
+  m_p00_right <= s4_p00(2 * G_PIX_W - 1 downto G_PIX_W);
+  m_p10_right <= s4_p10(2 * G_PIX_W - 1 downto G_PIX_W);
+  m_p01_right <= s4_p01(2 * G_PIX_W - 1 downto G_PIX_W);
+  m_p11_right <= s4_p11(2 * G_PIX_W - 1 downto G_PIX_W);
+
+  p_sideband : process (clk)
+  begin
+    if rising_edge(clk) then
+      valid         <= valid(2 downto 1) & s_valid;
+      row_first     <= row_first(2 downto 1) & s_row_first;
+      plane_first   <= plane_first(2 downto 1) & s_plane_first;
+      plane_last    <= plane_last(2 downto 1) & s_plane_last;
+      usable_x      <= usable_x(2 downto 1) & s_usable_x;
+      usable_y      <= usable_y(2 downto 1) & s_usable_y;
+      m_valid       <= valid(3);
+      m_row_first   <= row_first(3);
+      m_plane_first <= plane_first(3);
+      m_plane_last  <= plane_last(3);
+      m_usable_x    <= usable_x(3);
+      m_usable_y    <= usable_y(3);
+      s1_fx_left    <= s_fx_left;
+      s2_fx_left    <= s1_fx_left;
+      s3_fx_left    <= s2_fx_left;
+      m_fx_left     <= s3_fx_left;
+      s1_fx_right   <= s_fx_right;
+      s2_fx_right   <= s1_fx_right;
+      s3_fx_right   <= s2_fx_right;
+      m_fx_right    <= s3_fx_right;
+      -- Constant over a row of at least C_ROW_MIN clocks: one register instead of a delay line.
+      if row_first(3) = '1' then
+        m_fy_left  <= s_fy_left;
+        m_fy_right <= s_fy_right;
+      end if;
+      if rst = '1' then
+        valid   <= (others => '0');
+        m_valid <= '0';
+      end if;
+    end if;
+  end process p_sideband;
+
+end architecture rtl;
