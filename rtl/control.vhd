@@ -1,0 +1,602 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- control: registers, checks, pixel packets and the order of samples of a tile (paper, section 4.2).
+--   Streams  : s_cfg is always ready. s_pix is ready while loading or draining. Nothing inside the engine stalls: a
+--              packet is taken as fast as it comes, the sweep runs to its end, and unload waits for its own stream only
+--   States   : idle, load (pixels), sweep (samples), flush (cells on their way to the map), unload, drain (pixels of a
+--              tile that was refused or too long)
+--   Sweep    : plane after plane, row after row, one sample a clock; rows of max(sweep_cols, C_ROW_MIN) clocks; the
+--              first sample in the clock after the last pixel; no bubble between rows or planes
+--   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
+--   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
+--              work the address of a write is not looked at. A last map beat beats an abort in the same clock
+--   Counters : saturating; clear also resets the latch that counts window errors once a tile. tile_clocks is kept
+--   Reset    : idle, sizes missing, table empty, counters 0; bounds are not reset: write them before the first start
+--   Golden   : sw/golden/control.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity control is
+  generic (
+    G_IMG_COLS   : integer := 340;
+    G_IMG_ROWS   : integer := 144;
+    G_PLANE_COLS : integer := 256;
+    G_PLANE_ROWS : integer := 130;
+    G_PLANES     : integer := 301;
+    G_WINDOW     : integer := 13;
+    G_MNCC_W     : integer := 13
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    s_cfg_tvalid : in  std_logic;
+    s_cfg_tready : out std_logic;
+    s_cfg_tdata  : in  std_logic_vector(47 downto 0);
+
+    s_pix_tvalid : in  std_logic;
+    s_pix_tready : out std_logic;
+    s_pix_tlast  : in  std_logic;
+
+    -- Writes to address_generator's memories; the data are s_cfg_tdata(31 downto 0).
+    table_we    : out std_logic;
+    table_addr  : out std_logic_vector(clog2(G_PLANES) + 2 downto 0);
+    offset_we   : out std_logic;
+    offset_addr : out std_logic_vector(1 downto 0);
+
+    -- Static during a tile.
+    win_last_col : out std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
+    win_last_row : out std_logic_vector(clog2(G_IMG_ROWS) - 1 downto 0);
+    threshold    : out std_logic_vector(G_MNCC_W - 1 downto 0);
+    left_x_lo    : out std_logic_vector(C_INT_W - 1 downto 0);
+    left_x_hi    : out std_logic_vector(C_INT_W - 1 downto 0);
+    left_y_lo    : out std_logic_vector(C_INT_W - 1 downto 0);
+    left_y_hi    : out std_logic_vector(C_INT_W - 1 downto 0);
+    right_x_lo   : out std_logic_vector(C_INT_W - 1 downto 0);
+    right_x_hi   : out std_logic_vector(C_INT_W - 1 downto 0);
+    right_y_lo   : out std_logic_vector(C_INT_W - 1 downto 0);
+    right_y_hi   : out std_logic_vector(C_INT_W - 1 downto 0);
+
+    -- Load, to storage; in the clock in which the pixel is on s_pix.
+    load_clear   : out std_logic;
+    load_valid   : out std_logic;
+    load_col     : out std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
+    load_row_odd : out std_logic;
+    load_row_end : out std_logic;
+
+    -- Sweep, to address_generator.
+    m_valid       : out std_logic;
+    m_row_first   : out std_logic; -- i = 0, only with m_valid
+    m_plane_first : out std_logic; -- j = 0, for the whole row
+    m_plane_last  : out std_logic; -- last sample of the plane
+    m_plane       : out std_logic_vector(clog2(G_PLANES) - 1 downto 0);
+
+    -- Updating.
+    map_start  : out std_logic; -- pulse with the first sample of a tile
+    map_unload : out std_logic; -- pulse: all planes are in the map
+    map_abort  : out std_logic; -- pulse: forget everything on its way
+    plane_done : in  std_logic; -- pulse: one more plane is in the map
+    map_last   : in  std_logic; -- the last map beat is being taken
+
+    window_error : in  std_logic; -- of address_generator, one a sample
+
+    state         : out std_logic_vector(2 downto 0);
+    busy          : out std_logic;
+    errors        : out std_logic_vector(7 downto 0);
+    error_count   : out std_logic_vector(15 downto 0);
+    tiles_done    : out std_logic_vector(15 downto 0);
+    tiles_dropped : out std_logic_vector(15 downto 0);
+    window_errors : out std_logic_vector(15 downto 0);
+    tile_clocks   : out std_logic_vector(31 downto 0)
+  );
+end entity control;
+
+architecture rtl of control is
+
+  constant C_SWEEP_COLS : integer := G_PLANE_COLS + G_WINDOW - 1;
+  constant C_SWEEP_ROWS : integer := G_PLANE_ROWS + G_WINDOW - 1;
+  -- One counter of columns and one of rows serve load and sweep.
+  constant C_COL_W       : integer := clog2(imax(imax(G_IMG_COLS, C_SWEEP_COLS), C_ROW_MIN));
+  constant C_ROW_W       : integer := clog2(imax(G_IMG_ROWS, C_SWEEP_ROWS));
+  constant C_PLANE_W     : integer := clog2(G_PLANES);
+  constant C_TABLE_W     : integer := C_PLANE_W + 3;
+  constant C_TABLE_WORDS : integer := 8 * G_PLANES;
+  -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, the pipeline holds fewer than
+  -- 15 of them.
+  constant C_FLIGHT_W    : integer := 4;
+
+  -- Registers.
+  constant C_COMMAND   : integer := 16#00#;
+  constant C_TILE_COLS : integer := 16#01#;
+  constant C_TILE_ROWS : integer := 16#02#;
+  constant C_WIN_COLS  : integer := 16#03#;
+  constant C_WIN_ROWS  : integer := 16#04#;
+  constant C_PLANES    : integer := 16#05#;
+  constant C_THRESHOLD : integer := 16#06#;
+  constant C_OFFSETS   : integer := 16#08#; -- four of them
+  constant C_LEFT      : integer := 16#10#; -- x_lo, x_hi, y_lo, y_hi
+  constant C_RIGHT     : integer := 16#14#;
+
+  signal state_q    : std_logic_vector(2 downto 0);
+  signal is_idle    : std_logic;
+  signal is_load    : std_logic;
+  signal is_sweep   : std_logic;
+  signal is_flush   : std_logic;
+  signal is_unload  : std_logic;
+  signal is_drain   : std_logic;
+
+  -- Decoded write.
+  signal cfg_value    : unsigned(31 downto 0);
+  signal cfg_less_1   : unsigned(11 downto 0); -- of the low 12 bits
+  signal cfg_command  : std_logic;             -- any write to COMMAND
+  signal cfg_register : std_logic;             -- any write to 0x0001 .. 0x001F, while idle
+  signal cfg_index    : unsigned(4 downto 0);
+  signal cfg_table    : std_logic;             -- any write to 0x8000 and up, while idle
+  signal table_ok     : std_logic;
+  signal table_next   : std_logic;             -- the word is the first unwritten one
+  signal command_start : std_logic;
+  signal command_abort : std_logic;
+  signal command_clear : std_logic;
+
+  -- Registers, sizes less 1.
+  signal tile_cols_ok   : std_logic;
+  signal tile_rows_ok   : std_logic;
+  signal win_cols_ok    : std_logic;
+  signal win_rows_ok    : std_logic;
+  signal planes_ok      : std_logic;
+  signal threshold_ok   : std_logic;
+  signal tile_last_col  : unsigned(clog2(G_PLANE_COLS) - 1 downto 0);
+  signal tile_last_row  : unsigned(clog2(G_PLANE_ROWS) - 1 downto 0);
+  signal win_last_col_q : unsigned(clog2(G_IMG_COLS) - 1 downto 0);
+  signal win_last_row_q : unsigned(clog2(G_IMG_ROWS) - 1 downto 0);
+  signal last_plane     : unsigned(C_PLANE_W - 1 downto 0);
+  signal table_words    : unsigned(C_TABLE_W downto 0); -- written so far, 0 .. 8 * G_PLANES
+
+  -- Limits of the counters; static during a tile, so their way here may be long.
+  signal sweep_last_col : unsigned(C_COL_W - 1 downto 0); -- last sample of a row
+  signal sweep_last_row : unsigned(C_ROW_W - 1 downto 0);
+  signal row_last_col   : unsigned(C_COL_W - 1 downto 0); -- last clock of a row
+
+  signal col         : unsigned(C_COL_W - 1 downto 0);
+  signal row         : unsigned(C_ROW_W - 1 downto 0);
+  signal plane       : unsigned(C_PLANE_W - 1 downto 0);
+  signal last_col    : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
+  signal last_row    : unsigned(C_ROW_W - 1 downto 0);
+  signal at_col_end  : std_logic;
+  signal at_row_end  : std_logic;
+  signal at_last     : std_logic; -- last pixel of the window, or last clock of the plane
+  signal at_tile_end : std_logic;
+  signal step        : std_logic;
+  signal active      : std_logic; -- a sample (no padding) is emitted
+  signal row_first   : std_logic;
+  signal plane_first : std_logic;
+  signal sample_last : std_logic;
+
+  signal pix_ready   : std_logic;
+  signal pix_fire    : std_logic;
+  signal load_done   : std_logic;
+  signal in_flight   : unsigned(C_FLIGHT_W - 1 downto 0);
+  signal flushed     : std_logic;
+  signal abort_q     : std_logic;
+  signal start_q     : std_logic;
+
+  signal start_ok    : std_logic;
+  signal tile_done   : std_logic;
+  signal tile_drop   : std_logic;
+  signal config_bad  : std_logic;
+  signal table_bad   : std_logic;
+  signal window_seen : std_logic; -- in this tile
+
+  -- Error events. One of the first four comes from s_cfg, one of the others from the tile: at most two a clock.
+  signal event_config  : std_logic;
+  signal event_table   : std_logic;
+  signal event_address : std_logic;
+  signal event_busy    : std_logic;
+  signal event_short   : std_logic;
+  signal event_long    : std_logic;
+  signal event_window  : std_logic;
+  signal cfg_event     : std_logic;
+  signal tile_event    : std_logic;
+  signal new_events    : unsigned(1 downto 0);
+  signal sample_lost   : std_logic;
+
+  signal error_bits          : std_logic_vector(7 downto 0);
+  signal error_count_q       : unsigned(15 downto 0);
+  signal error_count_next    : unsigned(16 downto 0);
+  signal tiles_done_q        : unsigned(15 downto 0);
+  signal tiles_dropped_q     : unsigned(15 downto 0);
+  signal window_errors_q     : unsigned(15 downto 0);
+  signal tile_clocks_q       : unsigned(31 downto 0);
+
+  function to_bit (b : boolean) return std_logic is
+  begin
+    if b then
+      return '1';
+    end if;
+    return '0';
+  end function to_bit;
+
+  -- value + 1, all ones stay.
+  function plus_1_saturated (value : unsigned(15 downto 0)) return unsigned is
+  begin
+    if value = 65535 then
+      return value;
+    end if;
+    return value + 1;
+  end function plus_1_saturated;
+
+begin
+
+  assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
+    report "control: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    severity failure;
+  assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
+    report "control: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    severity failure;
+  assert G_PLANE_COLS >= 1 and G_PLANE_COLS <= 4096
+    report "control: G_PLANE_COLS=" & integer'image(G_PLANE_COLS) & " outside 1..4096"
+    severity failure;
+  assert G_PLANE_ROWS >= 1 and G_PLANE_ROWS <= 4096
+    report "control: G_PLANE_ROWS=" & integer'image(G_PLANE_ROWS) & " outside 1..4096"
+    severity failure;
+  assert G_PLANES >= 1 and G_PLANES <= 1024
+    report "control: G_PLANES=" & integer'image(G_PLANES) & " outside 1..1024"
+    severity failure;
+  assert G_WINDOW >= 3 and G_WINDOW <= 21 and G_WINDOW mod 2 = 1
+    report "control: G_WINDOW=" & integer'image(G_WINDOW) & " outside 3..21 or even"
+    severity failure;
+  assert G_MNCC_W >= 4 and G_MNCC_W <= 16
+    report "control: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    severity failure;
+
+  is_idle   <= to_bit(state_q = C_STATE_IDLE);
+  is_load   <= to_bit(state_q = C_STATE_LOAD);
+  is_sweep  <= to_bit(state_q = C_STATE_SWEEP);
+  is_flush  <= to_bit(state_q = C_STATE_FLUSH);
+  is_unload <= to_bit(state_q = C_STATE_UNLOAD);
+  is_drain  <= to_bit(state_q = C_STATE_DRAIN);
+
+  -- Register writes --------------------------------------------------------------------------------------------------
+  s_cfg_tready  <= '1';
+  cfg_value     <= unsigned(s_cfg_tdata(31 downto 0));
+  cfg_less_1    <= unsigned(s_cfg_tdata(11 downto 0)) - 1;
+  cfg_index     <= unsigned(s_cfg_tdata(36 downto 32));
+  cfg_command   <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
+  cfg_register  <= s_cfg_tvalid and is_idle and to_bit(unsigned(s_cfg_tdata(47 downto 37)) = 0)
+                   and to_bit(cfg_index /= C_COMMAND);
+  cfg_table     <= s_cfg_tvalid and is_idle and s_cfg_tdata(47);
+  command_clear <= cfg_command and s_cfg_tdata(2);
+  command_abort <= cfg_command and s_cfg_tdata(1);
+  command_start <= cfg_command and s_cfg_tdata(0) and not s_cfg_tdata(1);
+
+  table_next  <= to_bit(resize(unsigned(s_cfg_tdata(46 downto 32)), C_TABLE_W + 1) = table_words);
+  table_ok    <= to_bit(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS)
+                 and to_bit(resize(unsigned(s_cfg_tdata(46 downto 32)), C_TABLE_W + 1) <= table_words);
+  table_we    <= cfg_table and table_ok;
+  table_addr  <= s_cfg_tdata(C_TABLE_W + 31 downto 32);
+  offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
+  offset_addr <= s_cfg_tdata(33 downto 32);
+
+  event_busy    <= (s_cfg_tvalid and not cfg_command and not is_idle) or (command_start and not is_idle);
+  event_address <= (cfg_table and not table_ok)
+                   or (cfg_register and to_bit(cfg_index = 7))
+                   or (cfg_register and to_bit(cfg_index >= 12 and cfg_index < C_LEFT))
+                   or (cfg_register and to_bit(cfg_index >= C_RIGHT + 4))
+                   or (s_cfg_tvalid and is_idle and not s_cfg_tdata(47)
+                       and to_bit(unsigned(s_cfg_tdata(46 downto 37)) /= 0));
+
+  config_bad   <= not (tile_cols_ok and tile_rows_ok and win_cols_ok and win_rows_ok and planes_ok and threshold_ok);
+  table_bad    <= to_bit(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
+  event_config <= command_start and is_idle and config_bad;
+  event_table  <= command_start and is_idle and not config_bad and table_bad;
+  start_ok     <= command_start and is_idle and not config_bad and not table_bad;
+
+  p_registers : process (clk)
+    variable v_ok : std_logic;
+  begin
+    if rising_edge(clk) then
+      if cfg_register = '1' then
+        if cfg_index = C_TILE_COLS then
+          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_COLS);
+          tile_cols_ok <= v_ok;
+          if v_ok = '1' then
+            tile_last_col <= cfg_less_1(tile_last_col'range);
+          end if;
+        elsif cfg_index = C_TILE_ROWS then
+          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_ROWS);
+          tile_rows_ok <= v_ok;
+          if v_ok = '1' then
+            tile_last_row <= cfg_less_1(tile_last_row'range);
+          end if;
+        elsif cfg_index = C_WIN_COLS then
+          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_IMG_COLS);
+          win_cols_ok <= v_ok;
+          if v_ok = '1' then
+            win_last_col_q <= cfg_less_1(win_last_col_q'range);
+          end if;
+        elsif cfg_index = C_WIN_ROWS then
+          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_IMG_ROWS);
+          win_rows_ok <= v_ok;
+          if v_ok = '1' then
+            win_last_row_q <= cfg_less_1(win_last_row_q'range);
+          end if;
+        elsif cfg_index = C_PLANES then
+          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_PLANES);
+          planes_ok <= v_ok;
+          if v_ok = '1' then
+            last_plane <= cfg_less_1(last_plane'range);
+          end if;
+        elsif cfg_index = C_THRESHOLD then
+          threshold_ok <= to_bit(cfg_value < 2 ** G_MNCC_W);
+          threshold    <= s_cfg_tdata(G_MNCC_W - 1 downto 0);
+        elsif cfg_index = C_LEFT then
+          left_x_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_LEFT + 1 then
+          left_x_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_LEFT + 2 then
+          left_y_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_LEFT + 3 then
+          left_y_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_RIGHT then
+          right_x_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_RIGHT + 1 then
+          right_x_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_RIGHT + 2 then
+          right_y_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        elsif cfg_index = C_RIGHT + 3 then
+          right_y_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+        end if;
+      end if;
+      if cfg_table = '1' and table_ok = '1' and table_next = '1' then
+        table_words <= table_words + 1;
+      end if;
+      sweep_last_col <= resize(tile_last_col, C_COL_W) + (G_WINDOW - 1);
+      sweep_last_row <= resize(tile_last_row, C_ROW_W) + (G_WINDOW - 1);
+      if rst = '1' then
+        tile_cols_ok   <= '0';
+        tile_rows_ok   <= '0';
+        win_cols_ok    <= '0';
+        win_rows_ok    <= '0';
+        planes_ok      <= '0';
+        threshold_ok   <= '1';
+        threshold      <= (others => '0');
+        win_last_col_q <= (others => '0'); -- nothing is loaded
+        win_last_row_q <= (others => '0');
+        table_words    <= (others => '0');
+      end if;
+    end if;
+  end process p_registers;
+
+  -- Only windows below C_ROW_MIN can have rows that need padding.
+  g_padding : if G_WINDOW < C_ROW_MIN generate
+    row_last_col <= sweep_last_col when sweep_last_col >= C_ROW_MIN - 1 else to_unsigned(C_ROW_MIN - 1, C_COL_W);
+  end generate g_padding;
+
+  g_no_padding : if G_WINDOW >= C_ROW_MIN generate
+    row_last_col <= sweep_last_col;
+  end generate g_no_padding;
+
+  -- Sequence ---------------------------------------------------------------------------------------------------------
+  pix_ready <= is_load or is_drain;
+  pix_fire  <= s_pix_tvalid and is_load;
+
+  last_col    <= resize(win_last_col_q, C_COL_W) when is_load = '1' else row_last_col;
+  last_row    <= resize(win_last_row_q, C_ROW_W) when is_load = '1' else sweep_last_row;
+  at_col_end  <= to_bit(col = last_col);
+  at_row_end  <= to_bit(row = last_row);
+  at_last     <= at_col_end and at_row_end;
+  at_tile_end <= is_sweep and at_last and to_bit(plane = last_plane);
+  step        <= pix_fire or is_sweep;
+  load_done   <= pix_fire and at_last and s_pix_tlast;
+  event_short <= pix_fire and s_pix_tlast and not at_last;
+  event_long  <= pix_fire and at_last and not s_pix_tlast;
+  sample_last <= active and at_row_end and to_bit(col = sweep_last_col);
+  flushed     <= is_flush and to_bit(in_flight = 0);
+  tile_done   <= is_unload and map_last;
+  -- A drained tile was counted when it was refused.
+  tile_drop   <= event_config or event_table or event_short or event_long
+                 or (command_abort and not is_idle and not is_drain and not tile_done and not event_short
+                     and not event_long);
+
+  p_sequence : process (clk)
+  begin
+    if rising_edge(clk) then
+      start_q <= load_done and not command_abort;
+      abort_q <= command_abort;
+
+      if is_idle = '1' then
+        if start_ok = '1' then
+          state_q <= C_STATE_LOAD;
+        elsif event_config = '1' or event_table = '1' then
+          state_q <= C_STATE_DRAIN;
+        end if;
+      elsif is_load = '1' then
+        if load_done = '1' then
+          state_q <= C_STATE_SWEEP;
+        elsif event_short = '1' then
+          state_q <= C_STATE_IDLE;
+        elsif event_long = '1' then
+          state_q <= C_STATE_DRAIN;
+        end if;
+      elsif is_sweep = '1' then
+        if at_tile_end = '1' then
+          state_q <= C_STATE_FLUSH;
+        end if;
+      elsif is_flush = '1' then
+        if flushed = '1' then
+          state_q <= C_STATE_UNLOAD;
+        end if;
+      elsif is_unload = '1' then
+        if tile_done = '1' then
+          state_q <= C_STATE_IDLE;
+        end if;
+      else
+        if s_pix_tvalid = '1' and s_pix_tlast = '1' then
+          state_q <= C_STATE_IDLE;
+        end if;
+      end if;
+      if rst = '1' or command_abort = '1' then
+        state_q <= C_STATE_IDLE;
+      end if;
+
+      -- Counters come back to 0 by themselves at the end of load and of every plane.
+      if step = '1' then
+        if at_col_end = '1' then
+          col <= (others => '0');
+          if at_row_end = '1' then
+            row <= (others => '0');
+          else
+            row <= row + 1;
+          end if;
+        else
+          col <= col + 1;
+        end if;
+      end if;
+      if is_sweep = '1' and at_last = '1' then
+        plane <= plane + 1;
+      end if;
+      if rst = '1' or is_idle = '1' then
+        col   <= (others => '0');
+        row   <= (others => '0');
+        plane <= (others => '0');
+      elsif at_tile_end = '1' then
+        plane <= (others => '0'); -- a legal table address
+      end if;
+
+      -- Flags of the sample to come, so that no decoding lies before the table's address.
+      row_first <= load_done or (is_sweep and at_col_end and not at_tile_end);
+      if load_done = '1' or (is_sweep = '1' and at_last = '1') then
+        plane_first <= '1';
+      elsif is_sweep = '1' and at_col_end = '1' then
+        plane_first <= '0';
+      end if;
+      if load_done = '1' then
+        active <= '1';
+      elsif is_sweep = '1' and at_col_end = '1' then
+        active <= not at_tile_end;
+      elsif col = sweep_last_col then
+        active <= '0';
+      end if;
+
+      if is_sweep = '1' and at_last = '1' and plane_done = '0' then
+        in_flight <= in_flight + 1;
+      elsif plane_done = '1' and not (is_sweep = '1' and at_last = '1') then
+        in_flight <= in_flight - 1;
+      end if;
+
+      if rst = '1' or command_abort = '1' then
+        row_first <= '0';
+        active    <= '0';
+        start_q   <= '0';
+      end if;
+      if rst = '1' or is_idle = '1' then
+        in_flight <= (others => '0');
+      end if;
+      if rst = '1' then
+        abort_q <= '0';
+      end if;
+    end if;
+  end process p_sequence;
+
+  s_pix_tready  <= pix_ready;
+  win_last_col  <= std_logic_vector(win_last_col_q);
+  win_last_row  <= std_logic_vector(win_last_row_q);
+  load_clear    <= is_idle;
+  load_valid    <= pix_fire;
+  load_col      <= std_logic_vector(col(clog2(G_IMG_COLS) - 1 downto 0));
+  load_row_odd  <= row(0);
+  load_row_end  <= at_col_end;
+  m_valid       <= active;
+  m_row_first   <= row_first;
+  m_plane_first <= plane_first;
+  m_plane_last  <= sample_last;
+  m_plane       <= std_logic_vector(plane);
+  map_start     <= start_q;
+  map_unload    <= flushed;
+  map_abort     <= abort_q;
+
+  -- Status -----------------------------------------------------------------------------------------------------------
+  -- In the clock after an abort the address generator still shows a sample of the tile.
+  sample_lost      <= window_error and not abort_q;
+  event_window     <= sample_lost and not window_seen;
+  cfg_event        <= event_config or event_table or event_address or event_busy;
+  tile_event       <= event_short or event_long or event_window;
+  new_events       <= (cfg_event and tile_event) & (cfg_event xor tile_event);
+  error_count_next <= ('0' & error_count_q) + new_events;
+
+  p_status : process (clk)
+  begin
+    if rising_edge(clk) then
+      error_bits(C_ERROR_CONFIG)  <= error_bits(C_ERROR_CONFIG) or event_config;
+      error_bits(C_ERROR_TABLE)   <= error_bits(C_ERROR_TABLE) or event_table;
+      error_bits(C_ERROR_SHORT)   <= error_bits(C_ERROR_SHORT) or event_short;
+      error_bits(C_ERROR_LONG)    <= error_bits(C_ERROR_LONG) or event_long;
+      error_bits(C_ERROR_WINDOW)  <= error_bits(C_ERROR_WINDOW) or event_window;
+      error_bits(C_ERROR_ADDRESS) <= error_bits(C_ERROR_ADDRESS) or event_address;
+      error_bits(C_ERROR_BUSY)    <= error_bits(C_ERROR_BUSY) or event_busy;
+      if error_count_next(16) = '0' then
+        error_count_q <= error_count_next(15 downto 0);
+      else
+        error_count_q <= (others => '1');
+      end if;
+      if tile_done = '1' then
+        tiles_done_q <= plus_1_saturated(tiles_done_q);
+      end if;
+      if tile_drop = '1' then
+        tiles_dropped_q <= plus_1_saturated(tiles_dropped_q);
+      end if;
+      if sample_lost = '1' then
+        window_errors_q <= plus_1_saturated(window_errors_q);
+      end if;
+      if event_window = '1' then
+        window_seen <= '1';
+      end if;
+      if start_ok = '1' then
+        window_seen <= '0';
+      end if;
+      -- Clear goes first: what happens in its own clock counts.
+      if command_clear = '1' then
+        error_bits                     <= (others => '0');
+        error_bits(C_ERROR_CONFIG)     <= event_config;
+        error_bits(C_ERROR_TABLE)      <= event_table;
+        error_bits(C_ERROR_SHORT)      <= event_short;
+        error_bits(C_ERROR_LONG)       <= event_long;
+        error_bits(C_ERROR_WINDOW)     <= event_window;
+        error_bits(C_ERROR_BUSY)       <= event_busy;
+        error_count_q                  <= resize(new_events, 16);
+        tiles_done_q(15 downto 1)      <= (others => '0');
+        tiles_done_q(0)                <= tile_done;
+        tiles_dropped_q(15 downto 1)   <= (others => '0');
+        tiles_dropped_q(0)             <= tile_drop;
+        window_errors_q(15 downto 1)   <= (others => '0');
+        window_errors_q(0)             <= sample_lost;
+        window_seen                    <= event_window;
+      end if;
+      if start_ok = '1' then
+        tile_clocks_q <= to_unsigned(1, 32);
+      elsif is_idle = '0' and is_drain = '0' and tile_done = '0' then
+        tile_clocks_q <= tile_clocks_q + 1;
+      end if;
+      if rst = '1' then
+        error_bits      <= (others => '0');
+        error_count_q   <= (others => '0');
+        tiles_done_q    <= (others => '0');
+        tiles_dropped_q <= (others => '0');
+        window_errors_q <= (others => '0');
+        window_seen     <= '0';
+        tile_clocks_q   <= (others => '0');
+      end if;
+    end if;
+  end process p_status;
+
+  state         <= state_q;
+  busy          <= not is_idle;
+  errors        <= error_bits;
+  error_count   <= std_logic_vector(error_count_q);
+  tiles_done    <= std_logic_vector(tiles_done_q);
+  tiles_dropped <= std_logic_vector(tiles_dropped_q);
+  window_errors <= std_logic_vector(window_errors_q);
+  tile_clocks   <= std_logic_vector(tile_clocks_q);
+
+end architecture rtl;
