@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// psweep depth: reads everything, checks everything, sweeps, writes everything (docs/file_formats.md lists the files).
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "app/engines.hpp"
+#include "app/options.hpp"
+#include "app/run_record.hpp"
+#include "core/error.hpp"
+#include "io/image_io.hpp"
+#include "io/output_dir.hpp"
+#include "io/pfm.hpp"
+#include "io/picture.hpp"
+#include "io/ply.hpp"
+#include "io/progress.hpp"
+#include "io/rectify.hpp"
+#include "io/reprojection.hpp"
+#include "io/text_file.hpp"
+
+namespace psweep {
+namespace {
+
+using nlohmann::ordered_json;
+
+DisparityRange parse_range(const std::string& text) {
+  const size_t at = text.find(':');  // the parser has checked the form
+  const DisparityRange range{std::atof(text.c_str()), std::atof(text.c_str() + at + 1)};
+  if (!(range.lo < range.hi)) {
+    throw InputError("--disparity-range: found '" + text + "', expected LO:HI, pixels, 0 < LO < HI");
+  }
+  return range;
+}
+
+// Planes by the user, else by the disparities that the calibration searches, else the rover's.
+PlaneSpacing choose_planes(const DepthOptions& o, const Calibration& calibration, int most) {
+  PlaneSpacing out;
+  const double fb = calibration.rig.cyclopean().fx * calibration.rig.baseline;
+  if (calibration.search) {
+    DisparityRange range = *calibration.search;
+    if (o.zmin) range.hi = fb / *o.zmin;
+    if (o.zmax) range.lo = fb / *o.zmax;
+    if (range.lo < range.hi) out = planes_for(calibration.rig, range);
+  }
+  if (o.zmin) out.zmin = *o.zmin;
+  if (o.zmax) out.zmax = *o.zmax;
+  if (o.planes) {
+    out.planes = *o.planes;
+  } else {
+    out.planes = std::min(out.planes, most);
+  }
+  if (!(out.zmin < out.zmax)) {
+    char text[120];
+    std::snprintf(text, sizeof text, "--zmin, --zmax: found %g and %g, expected zmin < zmax", out.zmin, out.zmax);
+    throw InputError(text);
+  }
+  return out;
+}
+
+golden::Config choose_format(const DepthOptions& o) {
+  golden::Config format;
+  format.planes = 1024;
+  if (!o.configuration.empty()) format = configuration_named(o.configuration);
+  auto set = [&](const std::optional<int>& value, int& field, const char* option) {
+    if (!value) return;
+    if (!o.configuration.empty() && *value != field) {
+      throw InputError(std::string(option) + ": found " + std::to_string(*value) + ", but configuration '" +
+                       o.configuration + "' has " + std::to_string(field));
+    }
+    field = *value;
+  };
+  set(o.window, format.window, "--window");
+  set(o.interp_bits, format.interp_frac, "--interp-bits");
+  set(o.mncc_bits, format.mncc_bits, "--mncc-bits");
+  set(o.frac_bits, format.frac_bits, "--frac-bits");
+  set(o.weight_bits, format.weight_bits, "--weight-bits");
+  if (!o.configuration.empty() && o.planes && *o.planes > format.planes) {
+    throw InputError("--planes: found " + std::to_string(*o.planes) + ", but configuration '" + o.configuration +
+                     "' has room for " + std::to_string(format.planes));
+  }
+  return format;
+}
+
+ordered_json cell_counts(const DepthResult& result) {
+  size_t found = 0;
+  size_t bits[6] = {};
+  for (const uint8_t m : result.mask.data) {
+    found += m == 0;
+    for (int b = 0; b < 6; ++b) bits[b] += (m >> b) & 1;
+  }
+  return {{"all", result.mask.data.size()},   {"with_depth", found},          {"outside", bits[0]},
+          {"no_variance", bits[1]},           {"below_threshold", bits[2]},   {"not_local_maximum", bits[3]},
+          {"removed_by_uniqueness", bits[4]}, {"removed_as_speckle", bits[5]}};
+}
+
+}  // namespace
+
+void depth_command(const DepthOptions& o) {
+  const auto start = std::chrono::steady_clock::now();
+  if (o.calibration.empty() && o.disparity_range.empty()) {
+    throw InputError("--calib: found nothing, expected a calibration file (or --disparity-range LO:HI)");
+  }
+  if (!o.cleanup && (o.no_uniqueness || o.no_speckle)) {
+    throw InputError("--no-uniqueness, --no-speckle: need --cleanup");
+  }
+  Gray left = read_gray(o.left);
+  Gray right = read_gray(o.right);
+  if (left.width != right.width || left.height != right.height) {
+    throw InputError(o.right + ": the image is " + std::to_string(right.width) + "x" + std::to_string(right.height) +
+                     ", but " + o.left + " is " + std::to_string(left.width) + "x" + std::to_string(left.height));
+  }
+  Calibration calibration = o.calibration.empty() ? Calibration() : read_calibration(o.calibration, o.rectify);
+  if (o.calibration.empty()) {
+    const DisparityRange range = parse_range(o.disparity_range);
+    calibration = disparity_range_calibration(range.lo, range.hi, left.width, left.height);
+  }
+  adopt_size(calibration, o.left, left.width, left.height);
+
+  OutputDir out(o.output);
+  if (calibration.raw) {
+    RectifiedPair pair = rectify_pair(calibration, left, right);
+    left = std::move(pair.left);
+    right = std::move(pair.right);
+    calibration.rig = pair.rig;
+    write_png(out.file("rectified_left.png"), left);
+    write_png(out.file("rectified_right.png"), right);
+    write_calibration(out.file("rectified_calib.yaml"), calibration.rig);
+  }
+
+  SweepSetup setup;
+  setup.rig = calibration.rig;
+  setup.format = choose_format(o);
+  setup.spacing = choose_planes(o, calibration, setup.format.planes);
+  setup.format.planes = setup.spacing.planes;
+  setup.threshold = threshold_for(setup.format, o.threshold);
+  if (left.width < setup.format.window || left.height < setup.format.window) {
+    throw InputError(o.left + ": the image is " + std::to_string(left.width) + "x" + std::to_string(left.height) +
+                     ", expected at least --window = " + std::to_string(setup.format.window) + " both ways");
+  }
+
+  EngineRun run;
+  {
+    Progress bar(o.engine, o.quiet);
+    run = run_engine(o.engine, left, right, setup, o.tile, o.configuration, o.threads,
+                     [&](size_t done, size_t total) { bar.update(done, total); });
+  }
+  DepthResult& result = run.result;
+  if (o.cleanup) throw InputError("--cleanup: not part of this build");
+
+  const double fb = setup.rig.cyclopean().fx * setup.rig.baseline;
+  const FloatImage disparity = left_disparity(setup.rig, result.depth);
+  write_pfm(out.file("depth.pfm"), result.depth);
+  write_pfm(out.file("mncc.pfm"), result.mncc);
+  write_pfm(out.file("disparity.pfm"), disparity);
+  write_png(out.file("mask.png"), result.mask);
+  write_png(out.file("depth.png"), depth_picture(result.depth, setup.spacing, calibration.metric, fb));
+  write_ply(out.file("cloud.ply"), point_cloud(setup.rig, result.depth, result.mncc, left));
+
+  RunRecord record;
+  record.rig = setup.rig;
+  record.spacing = setup.spacing;
+  record.window = setup.format.window;
+  record.metric = calibration.metric;
+  ordered_json& j = record.json;
+  j["psweep"] = PSWEEP_VERSION;
+  j["engine"] = o.engine;
+  j["left"] = o.left;
+  j["right"] = o.right;
+  j["calibration"] = {{"kind", to_string(calibration.kind)}, {"file", o.calibration}};
+  j["threshold"] = o.threshold;
+  if (o.engine != "float") {
+    const golden::Config& f = setup.format;
+    j["format"] = {{"pixel_bits", f.pix_bits}, {"interp_bits", f.interp_frac}, {"weight_bits", f.weight_bits},
+                   {"mncc_bits", f.mncc_bits}, {"frac_bits", f.frac_bits},     {"threshold", setup.threshold}};
+    j["tiles"] = {{"count", run.tiles}, {"largest_cols", run.largest_cols}, {"largest_rows", run.largest_rows}};
+  }
+  j["cleanup"] = {{"uniqueness", o.cleanup && !o.no_uniqueness}, {"speckle", o.cleanup && !o.no_speckle}};
+  j["cells"] = cell_counts(result);
+  j["seconds"] = run.seconds;
+  j["seconds_in_all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (run.rtl) {
+    const auto clocks = static_cast<double>(run.rtl->clocks_in_all);
+    j["rtl"] = {{"configuration", run.rtl->configuration},
+                {"image_buffer", {run.rtl->generics.img_cols, run.rtl->generics.img_rows}},
+                {"largest_tile", {run.rtl->generics.plane_cols, run.rtl->generics.plane_rows}},
+                {"lanes", run.rtl->generics.lanes},
+                {"clocks", run.rtl->clocks},
+                {"clocks_by_formula", run.rtl->clocks_expected},
+                {"clocks_in_all", run.rtl->clocks_in_all},
+                {"seconds_at_166_MHz", clocks / 166e6},
+                {"seconds_at_300_MHz", clocks / 300e6},
+                {"simulated_clocks_per_second", run.seconds > 0 ? clocks / run.seconds : 0}};
+  }
+  write_record(out.file("report.json"), record);
+  out.commit(output_names());
+
+  if (o.quiet) return;
+  size_t found = 0;
+  for (const uint8_t m : result.mask.data) found += m == 0;
+  std::printf("%s: %dx%d, %d planes %g .. %g m, window %d: %.2f %% of the cells have a depth, %.2f s\n",
+              o.engine.c_str(), setup.rig.width, setup.rig.height, setup.spacing.planes, setup.spacing.zmin,
+              setup.spacing.zmax, setup.format.window,
+              100.0 * static_cast<double>(found) / static_cast<double>(result.mask.data.size()), run.seconds);
+  if (run.rtl) {
+    const auto clocks = static_cast<double>(run.rtl->clocks_in_all);
+    std::printf("configuration %s: %d tiles, %.3f M clocks = %.3f s at 166 MHz, %.3f s at 300 MHz\n",
+                run.rtl->configuration.c_str(), run.tiles, clocks / 1e6, clocks / 166e6, clocks / 300e6);
+  }
+  std::printf("written: %s\n", out.target().c_str());
+}
+
+}  // namespace psweep

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/engines.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "core/error.hpp"
+#include "golden/psweep.hpp"
+#ifdef PSWEEP_HAVE_RTL
+#include "rtl/rtl_engine.hpp"
+#endif
+
+namespace psweep {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+TileSize parse_tile(const std::string& text) {
+  const size_t at = text.find('x');  // the parser has checked the form
+  return {std::atoi(text.c_str()), std::atoi(text.c_str() + at + 1)};
+}
+
+// Sizes of the format such that this tile fits: the models have no memory of fixed size.
+void fit_format(SweepSetup& setup, TileSize tile) {
+  const BufferSize need = required_buffer(setup, tile.cols, tile.rows);
+  setup.format.img_cols = need.img_cols;
+  setup.format.img_rows = need.img_rows;
+  setup.format.plane_cols = need.plane_cols;
+  setup.format.plane_rows = need.plane_rows;
+  setup.format.planes = setup.spacing.planes;
+}
+
+void describe_tiles(const Plan& plan, EngineRun& run) {
+  run.tiles = static_cast<int>(plan.tiles.size());
+  for (const auto& tile : plan.tiles) {
+    run.largest_cols = std::max(run.largest_cols, tile.job.tile_cols);
+    run.largest_rows = std::max(run.largest_rows, tile.job.tile_rows);
+  }
+}
+
+EngineRun run_fixed_engine(const Gray& left, const Gray& right, SweepSetup setup, const std::string& tile, int threads,
+                           const ProgressCall& progress) {
+  fit_format(setup, tile.empty() ? TileSize{256, 130} : parse_tile(tile));
+  const Plan plan = plan_tiles(setup, setup.format.plane_cols, setup.format.plane_rows);
+  EngineRun run;
+  describe_tiles(plan, run);
+  const auto start = Clock::now();
+  std::vector<std::vector<golden::MapCell>> cells(plan.tiles.size());
+  std::mutex mutex;
+  size_t next = 0, done = 0;
+  auto work = [&] {
+    for (;;) {
+      size_t mine;
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (next == plan.tiles.size()) return;
+        mine = next++;
+      }
+      const PlacedTile& t = plan.tiles[mine];
+      cells[mine] = golden::run_tile(setup.format, t.job, plan.table,
+                                     cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                                     cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows))
+                        .cells;
+      const std::lock_guard<std::mutex> lock(mutex);
+      progress(++done, plan.tiles.size());
+    }
+  };
+  std::vector<std::thread> workers;
+  const int count = threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  for (int i = 0; i < count; ++i) workers.emplace_back(work);
+  for (auto& worker : workers) worker.join();
+  run.result = to_result(setup, assemble(setup.rig, plan, cells));
+  run.seconds = since(start);
+  return run;
+}
+
+#ifdef PSWEEP_HAVE_RTL
+
+// The configuration and tile size that finish in the fewest clocks; both may be fixed by the user.
+const rtl::Configuration* choose(SweepSetup& setup, const std::string& tile, const std::string& name, Plan& plan) {
+  const rtl::Configuration* best = nullptr;
+  uint64_t best_clocks = std::numeric_limits<uint64_t>::max();
+  std::string why;
+  for (const auto& c : rtl::configurations()) {
+    if (!name.empty() && c.name != name) continue;
+    SweepSetup trial = setup;
+    trial.format.img_cols = c.config.img_cols;
+    trial.format.img_rows = c.config.img_rows;
+    trial.format.plane_cols = c.config.plane_cols;
+    trial.format.plane_rows = c.config.plane_rows;
+    trial.format.planes = setup.spacing.planes;
+    trial.format.lanes = c.config.lanes;
+    if (!rtl::serves(c.config, trial.format)) {
+      why =
+          "its window or number formats differ, or it has room for " + std::to_string(c.config.planes) + " planes only";
+      continue;
+    }
+    trial.format.planes = c.config.planes;
+    try {
+      const TileSize size = tile.empty() ? largest_tile(trial) : parse_tile(tile);
+      const Plan candidate = plan_tiles(trial, size.cols, size.rows);
+      const uint64_t clocks = plan_clocks(trial.format, candidate);
+      if (clocks < best_clocks) {
+        best_clocks = clocks;
+        best = &c;
+        plan = candidate;
+        setup.format = trial.format;
+      }
+    } catch (const InputError& e) {
+      why = e.what();  // too small for this tile or disparity range
+    }
+  }
+  if (best) return best;
+  fit_format(setup, tile.empty() ? TileSize{64, 64} : parse_tile(tile));
+  std::string built;
+  for (const auto& c : rtl::configurations()) built += (built.empty() ? "" : ", ") + c.name;
+  throw InputError("--engine rtl: " +
+                   (name.empty() ? "none of the built configurations (" + built + ") serves this window, format, " +
+                                       "number of planes and tile"
+                                 : "configuration '" + name + "' cannot serve this request: " + why) +
+                   ".\nBuild one that does, in the root of the repository, and repeat:\n  " +
+                   rtl::build_command(setup.format));
+}
+
+EngineRun run_rtl_engine(const Gray& left, const Gray& right, SweepSetup setup, const std::string& tile,
+                         const std::string& configuration, int threads, const ProgressCall& progress) {
+  if (!configuration.empty()) configuration_named(configuration);
+  Plan plan;
+  const rtl::Configuration* chosen = choose(setup, tile, configuration, plan);
+  EngineRun run;
+  describe_tiles(plan, run);
+  RtlFigures figures;
+  figures.configuration = chosen->name;
+  figures.generics = chosen->config;
+  figures.clocks_expected = plan_clocks(setup.format, plan);
+  const auto start = Clock::now();
+  std::vector<std::vector<golden::MapCell>> cells(plan.tiles.size());
+  std::atomic<uint64_t> clock_counter{0};
+  std::atomic<bool> finished{false};
+  // Tiles take minutes, so progress counts clocks.
+  std::thread watcher([&] {
+    while (!finished) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      progress(clock_counter, figures.clocks_expected);
+    }
+  });
+  std::string failure;
+  try {
+    rtl::run_tiles(
+        *chosen, plan.table, static_cast<int>(plan.tiles.size()), threads,
+        [&](int i) {
+          const PlacedTile& t = plan.tiles[i];
+          return rtl::TileInput{t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                                cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+        },
+        [&](int i, rtl::TileOutput out) {
+          if (out.window_errors != 0) {
+            throw rtl::EngineError("rtl engine: tile " + std::to_string(i) + ": " + std::to_string(out.window_errors) +
+                                   " samples lie outside the loaded window");
+          }
+          figures.clocks += out.clocks;
+          figures.clocks_in_all += out.all_clocks;
+          cells[i] = std::move(out.cells);
+        },
+        &clock_counter);
+  } catch (...) {
+    finished = true;
+    watcher.join();
+    throw;
+  }
+  finished = true;
+  watcher.join();
+  run.result = to_result(setup, assemble(setup.rig, plan, cells));
+  run.rtl = figures;
+  run.seconds = since(start);
+  return run;
+}
+
+#endif
+
+}  // namespace
+
+golden::Config configuration_named(const std::string& name) {
+#ifdef PSWEEP_HAVE_RTL
+  std::string built;
+  for (const auto& c : rtl::configurations()) {
+    if (c.name == name) return c.config;
+    built += (built.empty() ? "" : ", ") + c.name;
+  }
+  throw InputError("--config: found '" + name + "', expected one of the built configurations: " + built);
+#else
+  throw InputError("--config: found '" + name + "', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
+#endif
+}
+
+EngineRun run_engine(const std::string& engine, const Gray& left, const Gray& right, SweepSetup setup,
+                     const std::string& tile, const std::string& configuration, int threads,
+                     const ProgressCall& progress) {
+  if (engine == "fixed") return run_fixed_engine(left, right, std::move(setup), tile, threads, progress);
+#ifdef PSWEEP_HAVE_RTL
+  if (engine == "rtl") return run_rtl_engine(left, right, std::move(setup), tile, configuration, threads, progress);
+#else
+  (void)configuration;
+  if (engine == "rtl") {
+    throw InputError("--engine: found 'rtl', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
+  }
+#endif
+  throw InputError("--engine: found '" + engine + "', expected float, fixed or rtl");
+}
+
+}  // namespace psweep
