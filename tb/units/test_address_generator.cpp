@@ -258,14 +258,14 @@ TEST_CASE("address_generator: positions anywhere, wrapping modulo 2^32") {
 
 TEST_CASE("address_generator: smallest buffer, one plane, widest weights") {
   golden::Config c;
-  c.img_cols = 2, c.img_rows = 2, c.planes = 1, c.weight_bits = 12;
+  c.img_cols = 4, c.img_rows = 4, c.planes = 1, c.weight_bits = 12;
   Bench<Vaddress_generator_min> bench(c);
   golden::TileJob t;
-  t.win_cols = 2, t.win_rows = 2;
-  t.left = t.right = {0, 1, 0, 1};
+  t.win_cols = 4, t.win_rows = 4;
+  t.left = t.right = {0, 3, 0, 3};
   std::vector<golden::PlaneEntry> table(1);
   for (uint32_t* step : {&table[0].dx_left, &table[0].dy_left, &table[0].dx_right, &table[0].dy_right})
-    *step = static_cast<uint32_t>(fixed(0.01));
+    *step = static_cast<uint32_t>(fixed(0.03));
   bench.load(t, table);
   bench.sweep(t, table, 120, 120, 0);
   bench.check();
