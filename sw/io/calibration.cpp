@@ -394,7 +394,8 @@ Calibration read_calibration(const std::filesystem::path& path, Rectify rectify)
                      "FileStorage reads it: " + e.err);
   }
   const cv::FileNode root = storage.isOpened() ? storage.root() : cv::FileNode();
-  auto has = [&](const std::string& name) { return root.isMap() && !root[name].empty(); };
+  if (!root.isMap()) throw InputError(in.file() + ": not a calibration: found no names with values");
+  auto has = [&](const std::string& name) { return !root[name].empty(); };
   const bool rectified = has("P1") || has("P2") || has("Q");
   const bool raw = has(name_of_k(root, "1")) || has(name_of_k(root, "2")) || has(name_of_d(root, "1")) ||
                    (!rectified && has("R") && has("T"));
@@ -417,9 +418,7 @@ Calibration read_calibration(const std::filesystem::path& path, Rectify rectify)
     out.rig = read_reprojection(in, root);
   } else {
     std::string keys;
-    if (root.isMap()) {
-      for (const auto& key : root.keys()) keys += (keys.empty() ? "" : ", ") + key;
-    }
+    for (const auto& key : root.keys()) keys += (keys.empty() ? "" : ", ") + key;
     throw InputError(in.file() + ": not a calibration: found " + (keys.empty() ? "no names" : "the names " + keys) +
                      ", expected left/right, P1/P2, Q, K1 D1 K2 D2 R T, or cam0= of Middlebury");
   }
