@@ -2,14 +2,14 @@
 #include "app/engines.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <limits>
-#include <mutex>
 #include <thread>
 
 #include "core/error.hpp"
-#include "golden/psweep.hpp"
+#include "fast/fast.hpp"
 #ifdef PSWEEP_HAVE_RTL
 #include "rtl/rtl_engine.hpp"
 #endif
@@ -26,7 +26,8 @@ TileSize parse_tile(const std::string& text) {
   return {std::atoi(text.c_str()), std::atoi(text.c_str() + at + 1)};
 }
 
-// Sizes of the format such that this tile fits: the models have no memory of fixed size.
+// Sizes of the format such that this tile fits: the models have no memory of fixed size. For the fixed engine tiles are
+// only what the hardware would do: the fast model sweeps whole frames, with the same result.
 void fit_format(SweepSetup& setup, TileSize tile) {
   const BufferSize need = required_buffer(setup, tile.cols, tile.rows);
   setup.format.img_cols = need.img_cols;
@@ -51,31 +52,11 @@ EngineRun run_fixed_engine(const Gray& left, const Gray& right, SweepSetup setup
   EngineRun run;
   describe_tiles(plan, run);
   const auto start = Clock::now();
-  std::vector<std::vector<golden::MapCell>> cells(plan.tiles.size());
-  std::mutex mutex;
-  size_t next = 0, done = 0;
-  auto work = [&] {
-    for (;;) {
-      size_t mine;
-      {
-        const std::lock_guard<std::mutex> lock(mutex);
-        if (next == plan.tiles.size()) return;
-        mine = next++;
-      }
-      const PlacedTile& t = plan.tiles[mine];
-      cells[mine] = golden::run_tile(setup.format, t.job, plan.table,
-                                     cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
-                                     cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows))
-                        .cells;
-      const std::lock_guard<std::mutex> lock(mutex);
-      progress(++done, plan.tiles.size());
-    }
-  };
-  std::vector<std::thread> workers;
-  const int count = threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  for (int i = 0; i < count; ++i) workers.emplace_back(work);
-  for (auto& worker : workers) worker.join();
-  run.result = to_result(setup, assemble(setup.rig, plan, cells));
+  FastOptions options;
+  options.threads = threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  options.progress = [&](double share) { progress(static_cast<size_t>(share * 1000), 1000); };
+  const Image<golden::MapCell> map = run_fixed(left, right, setup, options);
+  run.result = to_result(setup, map);
   run.seconds = since(start);
   return run;
 }
