@@ -314,9 +314,9 @@ TEST_CASE("running sums equal plain sums over every window") {
   TileJob t;
   t.tile_cols = 17, t.tile_rows = 9;
   t.win_cols = 24, t.win_rows = 16;
-  t.left = {0, 20, 0, 14};
-  t.right = {1, 22, 0, 14};
-  const PlaneEntry p{1 << 18, 1 << 17, -(1 << 19), 0, (1 << 19) + 999, 1 << 19, 1 << 19, (1 << 19) - 5000};
+  t.left = {0, 17, 0, 14};
+  t.right = {0, 22, 0, 14};
+  const PlaneEntry p{1 << 18, 1 << 17, 1 << 19, 0, (1 << 19) + 999, 1 << 19, 1 << 19, (1 << 19) - 5000};
   Pixels left(t.win_cols, t.win_rows), right(t.win_cols, t.win_rows);
   for (auto& v : left.data) v = static_cast<uint16_t>(random.below(256));
   for (auto& v : right.data) v = static_cast<uint16_t>(random.below(256));
