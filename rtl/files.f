@@ -2,6 +2,7 @@
 psweep_pkg.vhd
 ram_sdp.vhd
 stream_reg.vhd
+control.vhd
 address_generator.vhd
 storage.vhd
 interpolation.vhd
