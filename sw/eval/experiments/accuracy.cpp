@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+// Measures accuracy on synthetic terrain and prints Markdown tables (docs/accuracy.md quotes them).
+//   psweep_accuracy [--size N] [--threads N] [--seeds 1,2,3] [--save DIR] EXPERIMENT ...
+// Experiments: float, fixed, formats, mncc, rules, cleanup. --save writes the pairs as PGM files.
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/error.hpp"
+#include "eval/cleanup.hpp"
+#include "eval/metrics.hpp"
+#include "fast/fast.hpp"
+#include "plan/planner.hpp"
+#include "reference/reference.hpp"
+#include "scene/scene.hpp"
+
+namespace psweep {
+namespace {
+
+constexpr int kWindow = 13;
+constexpr double kThreshold = 0.85;
+
+struct Options {
+  int size = 1120, threads = 2;
+  std::vector<uint64_t> seeds{1, 2, 3};
+  std::string save;
+  std::vector<std::string> experiments;
+  bool wants(const std::string& name) const {
+    for (const auto& e : experiments) {
+      if (e == name) return true;
+    }
+    return false;
+  }
+};
+
+double seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void save_pgm(const std::string& path, const Gray& image) {
+  std::ofstream file(path, std::ios::binary);
+  file << "P5\n" << image.width << " " << image.height << "\n255\n";
+  file.write(reinterpret_cast<const char*>(image.data.data()), static_cast<std::streamsize>(image.data.size()));
+  if (!file) throw InputError(path + ": cannot write");
+}
+
+class Bench {
+ public:
+  Bench(const Options& options, SceneKind kind, uint64_t seed) : options_(options) {
+    name_ = std::string(kind == SceneKind::kRocky ? "rocky" : "flat") + " " + std::to_string(seed);
+    const double start = seconds();
+    scene_ = render(kind, seed, options.size, options.threads);
+    std::fprintf(stderr, "%s: rendered in %.1f s\n", name_.c_str(), seconds() - start);
+    if (!options.save.empty()) {
+      const std::string stem = options.save + "/" + name_.substr(0, name_.find(' ')) + std::to_string(seed);
+      save_pgm(stem + "_left.pgm", scene_.left);
+      save_pgm(stem + "_right.pgm", scene_.right);
+    }
+    selected_ = evaluated_cells(scene_.truth, scene_.rig, spacing_, kWindow);
+    plain_ = run("float", [&] { return floating({}); });
+    report("float", plain_, false);
+  }
+
+  void experiments() {
+    if (options_.wants("cleanup")) {
+      cleaned("float + uniqueness", plain_, true, false);
+      cleaned("float + speckle", plain_, false, true);
+      cleaned("float + both", plain_, true, true);
+    }
+    if (options_.wants("mncc")) {
+      for (const int bits : {8, 10, 12, 13, 14, 16, 18}) {
+        FloatOptions o;
+        o.mncc_bits = bits;
+        const std::string name = "float, MNCC " + std::to_string(bits) + " bits";
+        report(name, run(name, [&] { return floating(o); }), true);
+      }
+    }
+    if (options_.wants("rules")) {
+      FloatOptions o;
+      o.rule = WinnerRule::kBestLocal;
+      report("float, best local maximum", run("rules", [&] { return floating(o); }), true);
+    }
+    if (options_.wants("fixed")) fixed(8, golden::Config{}.interp_frac, golden::Config{}.mncc_bits, true);
+    if (options_.wants("formats")) {
+      for (const auto& [interp, mncc] : std::vector<std::pair<int, int>>{{0, 13}, {2, 13}, {4, 13}, {4, 14}, {6, 14}}) {
+        for (const int weight : {6, 8, 10}) fixed(weight, interp, mncc, false);
+      }
+    }
+    std::fflush(stdout);
+  }
+
+ private:
+  DepthResult floating(const FloatOptions& o) const {
+    return run_float(scene_.left, scene_.right, scene_.rig, spacing_, kWindow, kThreshold, o, options_.threads);
+  }
+
+  void fixed(int weight, int interp, int mncc, bool with_cleanup) {
+    SweepSetup setup;
+    setup.rig = scene_.rig;
+    setup.spacing = spacing_;
+    setup.format.weight_bits = weight;
+    setup.format.interp_frac = interp;
+    setup.format.mncc_bits = mncc;
+    setup.format.window = kWindow;
+    setup.threshold = threshold_for(setup.format, kThreshold);
+    const std::string name =
+        "fixed 8." + std::to_string(interp) + ", MNCC " + std::to_string(mncc) + ", weight " + std::to_string(weight);
+    FastOptions o;
+    o.threads = options_.threads;
+    const DepthResult r =
+        run(name, [&] { return to_result(setup, run_fixed(scene_.left, scene_.right, setup, o)); });
+    report(name, r, true);
+    if (with_cleanup) cleaned(name + " + both", r, true, true);
+  }
+
+  DepthResult run(const std::string& what, const std::function<DepthResult()>& engine) const {
+    const double start = seconds();
+    DepthResult r = engine();
+    std::fprintf(stderr, "%s: %s in %.1f s\n", name_.c_str(), what.c_str(), seconds() - start);
+    return r;
+  }
+
+  void cleaned(const std::string& what, DepthResult r, bool uniqueness, bool speckle) const {
+    CleanupOptions o;
+    o.uniqueness = uniqueness;
+    o.speckle = speckle;
+    clean_up(r, scene_.rig, o);
+    report(what, r, false);
+  }
+
+  void report(const std::string& what, const DepthResult& r, bool against_float) const {
+    const Metrics m = evaluate(r.depth, scene_.truth, scene_.rig, spacing_, kWindow);
+    std::printf("| %s | %s | %.2f | %.2f | %.1f | %.2f | %.1f | %.2f |", name_.c_str(), what.c_str(), m.M1_mm,
+                m.M2a_percent, m.M2b_mm, m.M3_percent, m.M4_px, m.rms_mm);
+    if (against_float) {
+      const Comparison c = compare(plain_.depth, r.depth, selected_);
+      std::printf(" %.2f | %.4f | %.2f | %.3f |", c.within_quarter_mm, c.off_2cm, c.same_holes, c.same_coverage);
+    } else {
+      std::printf(" | | | |");
+    }
+    std::printf("\n");
+    std::fflush(stdout);
+  }
+
+  const Options& options_;
+  std::string name_;
+  Scene scene_;
+  PlaneSpacing spacing_;
+  Image<uint8_t> selected_;
+  DepthResult plain_;
+};
+
+Options parse(int argc, char** argv) {
+  Options o;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const auto value = [&]() -> std::string {
+      if (++i == argc) throw InputError(word + ": expected a value");
+      return argv[i];
+    };
+    if (word == "--size") {
+      o.size = std::atoi(value().c_str());
+    } else if (word == "--threads") {
+      o.threads = std::atoi(value().c_str());
+    } else if (word == "--save") {
+      o.save = value();
+    } else if (word == "--seeds") {
+      o.seeds.clear();
+      const std::string list = value();
+      for (size_t at = 0; at < list.size(); at = std::min(list.find(',', at), list.size() - 1) + 1) {
+        o.seeds.push_back(std::strtoull(list.c_str() + at, nullptr, 10));
+      }
+    } else {
+      o.experiments.push_back(word);
+    }
+  }
+  return o;
+}
+
+}  // namespace
+}  // namespace psweep
+
+int main(int argc, char** argv) {
+  try {
+    const psweep::Options options = psweep::parse(argc, argv);
+    std::printf("| scene | engine | M1 mm | M2.a %% | M2.b mm | M3 %% | M4 px | RMS mm | <= 0.25 mm of float %% | "
+                "> 2 cm %% | float's holes kept %% | hole or depth as float %% |\n");
+    std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+    for (const auto kind : {psweep::SceneKind::kRocky, psweep::SceneKind::kFlat}) {
+      for (const uint64_t seed : options.seeds) psweep::Bench(options, kind, seed).experiments();
+    }
+  } catch (const psweep::InputError& e) {
+    std::fprintf(stderr, "psweep_accuracy: %s\n", e.what());
+    return 2;
+  }
+  return 0;
+}
