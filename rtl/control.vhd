@@ -522,7 +522,6 @@ begin
   event_window     <= sample_lost and not window_seen;
   cfg_event        <= event_config or event_table or event_address or event_busy;
   tile_event       <= event_short or event_long or event_window;
-  new_events       <= (cfg_event and tile_event) & (cfg_event xor tile_event);
   error_count_next <= ('0' & error_count_q) + new_events;
 
   p_status : process (clk)
@@ -535,6 +534,8 @@ begin
       error_bits(C_ERROR_WINDOW)  <= error_bits(C_ERROR_WINDOW) or event_window;
       error_bits(C_ERROR_ADDRESS) <= error_bits(C_ERROR_ADDRESS) or event_address;
       error_bits(C_ERROR_BUSY)    <= error_bits(C_ERROR_BUSY) or event_busy;
+      -- Counted a clock later: the way from s_cfg through the table's checks is long enough.
+      new_events <= (cfg_event and tile_event) & (cfg_event xor tile_event);
       if error_count_next(16) = '0' then
         error_count_q <= error_count_next(15 downto 0);
       else
@@ -557,21 +558,21 @@ begin
       end if;
       -- Clear goes first: what happens in its own clock counts.
       if command_clear = '1' then
-        error_bits                     <= (others => '0');
-        error_bits(C_ERROR_CONFIG)     <= event_config;
-        error_bits(C_ERROR_TABLE)      <= event_table;
-        error_bits(C_ERROR_SHORT)      <= event_short;
-        error_bits(C_ERROR_LONG)       <= event_long;
-        error_bits(C_ERROR_WINDOW)     <= event_window;
-        error_bits(C_ERROR_BUSY)       <= event_busy;
-        error_count_q                  <= resize(new_events, 16);
-        tiles_done_q(15 downto 1)      <= (others => '0');
-        tiles_done_q(0)                <= tile_done;
-        tiles_dropped_q(15 downto 1)   <= (others => '0');
-        tiles_dropped_q(0)             <= tile_drop;
-        window_errors_q(15 downto 1)   <= (others => '0');
-        window_errors_q(0)             <= sample_lost;
-        window_seen                    <= event_window;
+        error_bits                   <= (others => '0');
+        error_bits(C_ERROR_CONFIG)   <= event_config;
+        error_bits(C_ERROR_TABLE)    <= event_table;
+        error_bits(C_ERROR_SHORT)    <= event_short;
+        error_bits(C_ERROR_LONG)     <= event_long;
+        error_bits(C_ERROR_WINDOW)   <= event_window;
+        error_bits(C_ERROR_BUSY)     <= event_busy;
+        error_count_q                <= (others => '0');
+        tiles_done_q(15 downto 1)    <= (others => '0');
+        tiles_done_q(0)              <= tile_done;
+        tiles_dropped_q(15 downto 1) <= (others => '0');
+        tiles_dropped_q(0)           <= tile_drop;
+        window_errors_q(15 downto 1) <= (others => '0');
+        window_errors_q(0)           <= sample_lost;
+        window_seen                  <= event_window;
       end if;
       if start_ok = '1' then
         tile_clocks_q <= to_unsigned(1, 32);
@@ -580,6 +581,7 @@ begin
       end if;
       if rst = '1' then
         error_bits      <= (others => '0');
+        new_events      <= (others => '0');
         error_count_q   <= (others => '0');
         tiles_done_q    <= (others => '0');
         tiles_dropped_q <= (others => '0');
