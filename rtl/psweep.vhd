@@ -1,0 +1,517 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- psweep: the plane-sweep stereo engine (paper, section 4.2, figure 4): a tile of pixels in, a tile of depth cells out.
+--   Streams   : s_cfg registers and plane table, s_pix the window of both images, m_map the cells (docs/interfaces.md)
+--   Rate      : one plane cell per clock through the whole sweep, no bubble between rows or planes
+--   Clocks    : from the start command to the last map beat, without stalls outside,
+--                 win_cols * win_rows
+--               + planes * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
+--               + tile_cols * tile_rows + a constant of the configuration        (sw/golden/control.hpp, checked by the
+--               bench; port tile_clocks counts them)
+--   Numbers   : docs/numeric_contract.md
+--   Lanes     : address_generator, interpolation and similarity are per lane (lane n sweeps plane k + n); bundles between
+--               entities hold lane 0 in the low bits. G_LANES = 1 in this version
+--   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
+--   dbg_*     : outputs of the stages for waves and tests; leave open
+--   Golden    : sw/golden/psweep.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity psweep is
+  generic (
+    G_IMG_COLS   : integer := 340;
+    G_IMG_ROWS   : integer := 144;
+    G_PLANE_COLS : integer := 256;
+    G_PLANE_ROWS : integer := 130;
+    G_PLANES     : integer := 301;
+    G_WINDOW     : integer := 13;
+    G_PIX_W      : integer := 8;
+    G_WEIGHT_W   : integer := 8;
+    G_INTERP_F   : integer := 2;
+    G_MNCC_W     : integer := 13;
+    G_FRAC_W     : integer := 8;
+    G_LANES      : integer := 1
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    s_cfg_tvalid : in  std_logic;
+    s_cfg_tready : out std_logic;
+    s_cfg_tdata  : in  std_logic_vector(47 downto 0);
+
+    s_pix_tvalid : in  std_logic;
+    s_pix_tready : out std_logic;
+    s_pix_tdata  : in  std_logic_vector(2 * G_PIX_W - 1 downto 0);
+    s_pix_tlast  : in  std_logic;
+
+    m_map_tvalid : out std_logic;
+    m_map_tready : in  std_logic;
+    m_map_tdata  : out std_logic_vector(4 + clog2(G_PLANES) + G_FRAC_W + G_MNCC_W - 1 downto 0);
+    m_map_tlast  : out std_logic;
+
+    busy          : out std_logic;
+    state         : out std_logic_vector(2 downto 0);
+    errors        : out std_logic_vector(7 downto 0);
+    error_count   : out std_logic_vector(15 downto 0);
+    tiles_done    : out std_logic_vector(15 downto 0);
+    tiles_dropped : out std_logic_vector(15 downto 0);
+    window_errors : out std_logic_vector(15 downto 0);
+    tile_clocks   : out std_logic_vector(31 downto 0);
+
+    -- Positions, pixels, samples, similarities: lane 0 in the low bits.
+    dbg_sample_valid     : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_xi_left          : out std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    dbg_yi_left          : out std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    dbg_fx_left          : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    dbg_fy_left          : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    dbg_xi_right         : out std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    dbg_yi_right         : out std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    dbg_fx_right         : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    dbg_fy_right         : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    dbg_usable_x         : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_usable_y         : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_window_error     : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_quad_valid       : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_p00_left         : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p10_left         : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p01_left         : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p11_left         : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p00_right        : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p10_right        : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p01_right        : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_p11_right        : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    dbg_interp_valid     : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_l                : out std_logic_vector(G_LANES * (G_PIX_W + G_INTERP_F) - 1 downto 0);
+    dbg_r                : out std_logic_vector(G_LANES * (G_PIX_W + G_INTERP_F) - 1 downto 0);
+    dbg_sim_valid        : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_sim_last         : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_sim_inside       : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_sim_textured     : out std_logic_vector(G_LANES - 1 downto 0);
+    dbg_sim_v            : out std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
+    -- Write port of the map.
+    dbg_map_we           : out std_logic;
+    dbg_map_addr         : out std_logic_vector(clog2(G_PLANE_COLS * G_PLANE_ROWS) - 1 downto 0);
+    dbg_map_best         : out std_logic_vector(G_MNCC_W - 1 downto 0);
+    dbg_map_prev         : out std_logic_vector(G_MNCC_W - 1 downto 0);
+    dbg_map_plane        : out std_logic_vector(clog2(G_PLANES) - 1 downto 0);
+    dbg_map_frac         : out std_logic_vector(G_FRAC_W - 1 downto 0);
+    dbg_map_local_max    : out std_logic;
+    dbg_map_prev_valid   : out std_logic
+  );
+end entity psweep;
+
+architecture rtl of psweep is
+
+  constant C_BANK_W   : integer := clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2));
+  constant C_SAMPLE_W : integer := G_PIX_W + G_INTERP_F;
+
+  signal pipe_rst : std_logic; -- also an abort clears what is on its way
+
+  -- Registers and table writes.
+  signal table_we     : std_logic;
+  signal table_addr   : std_logic_vector(clog2(G_PLANES) + 2 downto 0);
+  signal offset_we    : std_logic;
+  signal offset_addr  : std_logic_vector(1 downto 0);
+  signal win_last_col : std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
+  signal win_last_row : std_logic_vector(clog2(G_IMG_ROWS) - 1 downto 0);
+  signal threshold    : std_logic_vector(G_MNCC_W - 1 downto 0);
+  signal left_x_lo    : std_logic_vector(C_INT_W - 1 downto 0);
+  signal left_x_hi    : std_logic_vector(C_INT_W - 1 downto 0);
+  signal left_y_lo    : std_logic_vector(C_INT_W - 1 downto 0);
+  signal left_y_hi    : std_logic_vector(C_INT_W - 1 downto 0);
+  signal right_x_lo   : std_logic_vector(C_INT_W - 1 downto 0);
+  signal right_x_hi   : std_logic_vector(C_INT_W - 1 downto 0);
+  signal right_y_lo   : std_logic_vector(C_INT_W - 1 downto 0);
+  signal right_y_hi   : std_logic_vector(C_INT_W - 1 downto 0);
+
+  -- Sequence.
+  signal load_clear        : std_logic;
+  signal load_valid        : std_logic;
+  signal load_col          : std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
+  signal load_row_odd      : std_logic;
+  signal load_row_end      : std_logic;
+  signal sweep_valid       : std_logic;
+  signal sweep_row_first   : std_logic;
+  signal sweep_plane_first : std_logic;
+  signal sweep_plane_last  : std_logic;
+  signal sweep_plane       : std_logic_vector(clog2(G_PLANES) - 1 downto 0);
+  signal map_start         : std_logic;
+  signal map_unload        : std_logic;
+  signal map_abort         : std_logic;
+  signal plane_done        : std_logic;
+  signal map_valid         : std_logic;
+  signal unload_done       : std_logic;
+  signal map_ready         : std_logic;
+  -- address_generator to storage.
+  signal address_valid          : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_row_first      : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_plane_first    : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_plane_last     : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_xi_left        : std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+  signal address_yi_left        : std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+  signal address_fx_left        : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal address_fy_left        : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal address_xi_right       : std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+  signal address_yi_right       : std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+  signal address_fx_right       : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal address_fy_right       : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal address_row_even_left  : std_logic_vector(G_LANES * C_BANK_W - 1 downto 0);
+  signal address_row_odd_left   : std_logic_vector(G_LANES * C_BANK_W - 1 downto 0);
+  signal address_row_even_right : std_logic_vector(G_LANES * C_BANK_W - 1 downto 0);
+  signal address_row_odd_right  : std_logic_vector(G_LANES * C_BANK_W - 1 downto 0);
+  signal address_usable_x       : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_usable_y       : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_window_error   : std_logic_vector(G_LANES - 1 downto 0);
+
+  -- storage to interpolation.
+  signal quad_valid       : std_logic_vector(G_LANES - 1 downto 0);
+  signal quad_row_first   : std_logic_vector(G_LANES - 1 downto 0);
+  signal quad_plane_first : std_logic_vector(G_LANES - 1 downto 0);
+  signal quad_plane_last  : std_logic_vector(G_LANES - 1 downto 0);
+  signal quad_usable_x    : std_logic_vector(G_LANES - 1 downto 0);
+  signal quad_usable_y    : std_logic_vector(G_LANES - 1 downto 0);
+  signal quad_fx_left     : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal quad_fy_left     : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal quad_fx_right    : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal quad_fy_right    : std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+  signal quad_p00_left    : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p10_left    : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p01_left    : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p11_left    : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p00_right   : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p10_right   : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p01_right   : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+  signal quad_p11_right   : std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+
+  -- interpolation to similarity.
+  signal sample_valid       : std_logic_vector(G_LANES - 1 downto 0);
+  signal sample_row_first   : std_logic_vector(G_LANES - 1 downto 0);
+  signal sample_plane_first : std_logic_vector(G_LANES - 1 downto 0);
+  signal sample_plane_last  : std_logic_vector(G_LANES - 1 downto 0);
+  signal sample_usable_x    : std_logic_vector(G_LANES - 1 downto 0);
+  signal sample_usable_y    : std_logic_vector(G_LANES - 1 downto 0);
+  signal sample_l           : std_logic_vector(G_LANES * C_SAMPLE_W - 1 downto 0);
+  signal sample_r           : std_logic_vector(G_LANES * C_SAMPLE_W - 1 downto 0);
+
+  -- similarity to updating.
+  signal cell_valid    : std_logic_vector(G_LANES - 1 downto 0);
+  signal cell_last     : std_logic_vector(G_LANES - 1 downto 0);
+  signal cell_inside   : std_logic_vector(G_LANES - 1 downto 0);
+  signal cell_textured : std_logic_vector(G_LANES - 1 downto 0);
+  signal cell_v        : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
+begin
+
+  -- Ranges of the other generics are checked by the entities that use them.
+  assert G_LANES = 1
+    report "psweep: G_LANES=" & integer'image(G_LANES) & " is not 1"
+    severity failure;
+
+  pipe_rst <= rst or map_abort;
+
+  u_control : entity work.control
+    generic map (
+      G_IMG_COLS   => G_IMG_COLS,
+      G_IMG_ROWS   => G_IMG_ROWS,
+      G_PLANE_COLS => G_PLANE_COLS,
+      G_PLANE_ROWS => G_PLANE_ROWS,
+      G_PLANES     => G_PLANES,
+      G_WINDOW     => G_WINDOW,
+      G_MNCC_W     => G_MNCC_W
+    )
+    port map (
+      clk           => clk,
+      rst           => rst,
+      s_cfg_tvalid  => s_cfg_tvalid,
+      s_cfg_tready  => s_cfg_tready,
+      s_cfg_tdata   => s_cfg_tdata,
+      s_pix_tvalid  => s_pix_tvalid,
+      s_pix_tready  => s_pix_tready,
+      s_pix_tlast   => s_pix_tlast,
+      table_we      => table_we,
+      table_addr    => table_addr,
+      offset_we     => offset_we,
+      offset_addr   => offset_addr,
+      win_last_col  => win_last_col,
+      win_last_row  => win_last_row,
+      threshold     => threshold,
+      left_x_lo     => left_x_lo,
+      left_x_hi     => left_x_hi,
+      left_y_lo     => left_y_lo,
+      left_y_hi     => left_y_hi,
+      right_x_lo    => right_x_lo,
+      right_x_hi    => right_x_hi,
+      right_y_lo    => right_y_lo,
+      right_y_hi    => right_y_hi,
+      load_clear    => load_clear,
+      load_valid    => load_valid,
+      load_col      => load_col,
+      load_row_odd  => load_row_odd,
+      load_row_end  => load_row_end,
+      m_valid       => sweep_valid,
+      m_row_first   => sweep_row_first,
+      m_plane_first => sweep_plane_first,
+      m_plane_last  => sweep_plane_last,
+      m_plane       => sweep_plane,
+      map_start     => map_start,
+      map_unload    => map_unload,
+      map_abort     => map_abort,
+      plane_done    => plane_done,
+      map_last      => unload_done,
+      window_error  => address_window_error(0),
+      state         => state,
+      busy          => busy,
+      errors        => errors,
+      error_count   => error_count,
+      tiles_done    => tiles_done,
+      tiles_dropped => tiles_dropped,
+      window_errors => window_errors,
+      tile_clocks   => tile_clocks
+    );
+
+  g_address : for lane in 0 to G_LANES - 1 generate
+
+    u_address_generator : entity work.address_generator
+      generic map (
+        G_PLANES   => G_PLANES,
+        G_IMG_COLS => G_IMG_COLS,
+        G_IMG_ROWS => G_IMG_ROWS,
+        G_WEIGHT_W => G_WEIGHT_W
+      )
+      port map (
+        clk              => clk,
+        rst              => pipe_rst,
+        table_we         => table_we,
+        table_addr       => table_addr,
+        offset_we        => offset_we,
+        offset_addr      => offset_addr,
+        cfg_data         => s_cfg_tdata(31 downto 0),
+        win_last_col     => win_last_col,
+        win_last_row     => win_last_row,
+        left_x_lo        => left_x_lo,
+        left_x_hi        => left_x_hi,
+        left_y_lo        => left_y_lo,
+        left_y_hi        => left_y_hi,
+        right_x_lo       => right_x_lo,
+        right_x_hi       => right_x_hi,
+        right_y_lo       => right_y_lo,
+        right_y_hi       => right_y_hi,
+        s_valid          => sweep_valid,
+        s_row_first      => sweep_row_first,
+        s_plane_first    => sweep_plane_first,
+        s_plane_last     => sweep_plane_last,
+        s_plane          => sweep_plane,
+        m_valid          => address_valid(lane),
+        m_row_first      => address_row_first(lane),
+        m_plane_first    => address_plane_first(lane),
+        m_plane_last     => address_plane_last(lane),
+        m_xi_left        => address_xi_left((lane + 1) * C_INT_W - 1 downto lane * C_INT_W),
+        m_yi_left        => address_yi_left((lane + 1) * C_INT_W - 1 downto lane * C_INT_W),
+        m_fx_left        => address_fx_left((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        m_fy_left        => address_fy_left((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        m_xi_right       => address_xi_right((lane + 1) * C_INT_W - 1 downto lane * C_INT_W),
+        m_yi_right       => address_yi_right((lane + 1) * C_INT_W - 1 downto lane * C_INT_W),
+        m_fx_right       => address_fx_right((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        m_fy_right       => address_fy_right((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        m_row_even_left  => address_row_even_left((lane + 1) * C_BANK_W - 1 downto lane * C_BANK_W),
+        m_row_odd_left   => address_row_odd_left((lane + 1) * C_BANK_W - 1 downto lane * C_BANK_W),
+        m_row_even_right => address_row_even_right((lane + 1) * C_BANK_W - 1 downto lane * C_BANK_W),
+        m_row_odd_right  => address_row_odd_right((lane + 1) * C_BANK_W - 1 downto lane * C_BANK_W),
+        m_usable_x       => address_usable_x(lane),
+        m_usable_y       => address_usable_y(lane),
+        m_window_error   => address_window_error(lane)
+      );
+
+  end generate g_address;
+
+  u_storage : entity work.storage
+    generic map (
+      G_IMG_COLS => G_IMG_COLS,
+      G_IMG_ROWS => G_IMG_ROWS,
+      G_PIX_W    => G_PIX_W,
+      G_WEIGHT_W => G_WEIGHT_W
+    )
+    port map (
+      clk              => clk,
+      rst              => pipe_rst,
+      load_clear       => load_clear,
+      load_valid       => load_valid,
+      load_col         => load_col,
+      load_row_odd     => load_row_odd,
+      load_row_end     => load_row_end,
+      load_data        => s_pix_tdata,
+      s_valid          => address_valid(0),
+      s_row_first      => address_row_first(0),
+      s_plane_first    => address_plane_first(0),
+      s_plane_last     => address_plane_last(0),
+      s_usable_x       => address_usable_x(0),
+      s_usable_y       => address_usable_y(0),
+      s_xi_left        => address_xi_left(clog2(G_IMG_COLS) - 1 downto 0),
+      s_yi_odd_left    => address_yi_left(0),
+      s_fx_left        => address_fx_left(G_WEIGHT_W - 1 downto 0),
+      s_fy_left        => address_fy_left(G_WEIGHT_W - 1 downto 0),
+      s_xi_right       => address_xi_right(clog2(G_IMG_COLS) - 1 downto 0),
+      s_yi_odd_right   => address_yi_right(0),
+      s_fx_right       => address_fx_right(G_WEIGHT_W - 1 downto 0),
+      s_fy_right       => address_fy_right(G_WEIGHT_W - 1 downto 0),
+      s_row_even_left  => address_row_even_left(C_BANK_W - 1 downto 0),
+      s_row_odd_left   => address_row_odd_left(C_BANK_W - 1 downto 0),
+      s_row_even_right => address_row_even_right(C_BANK_W - 1 downto 0),
+      s_row_odd_right  => address_row_odd_right(C_BANK_W - 1 downto 0),
+      m_valid          => quad_valid(0),
+      m_row_first      => quad_row_first(0),
+      m_plane_first    => quad_plane_first(0),
+      m_plane_last     => quad_plane_last(0),
+      m_usable_x       => quad_usable_x(0),
+      m_usable_y       => quad_usable_y(0),
+      m_fx_left        => quad_fx_left(G_WEIGHT_W - 1 downto 0),
+      m_fy_left        => quad_fy_left(G_WEIGHT_W - 1 downto 0),
+      m_fx_right       => quad_fx_right(G_WEIGHT_W - 1 downto 0),
+      m_fy_right       => quad_fy_right(G_WEIGHT_W - 1 downto 0),
+      m_p00_left       => quad_p00_left(G_PIX_W - 1 downto 0),
+      m_p10_left       => quad_p10_left(G_PIX_W - 1 downto 0),
+      m_p01_left       => quad_p01_left(G_PIX_W - 1 downto 0),
+      m_p11_left       => quad_p11_left(G_PIX_W - 1 downto 0),
+      m_p00_right      => quad_p00_right(G_PIX_W - 1 downto 0),
+      m_p10_right      => quad_p10_right(G_PIX_W - 1 downto 0),
+      m_p01_right      => quad_p01_right(G_PIX_W - 1 downto 0),
+      m_p11_right      => quad_p11_right(G_PIX_W - 1 downto 0)
+    );
+
+  g_similarity : for lane in 0 to G_LANES - 1 generate
+
+    u_interpolation : entity work.interpolation
+      generic map (
+        G_PIX_W    => G_PIX_W,
+        G_WEIGHT_W => G_WEIGHT_W,
+        G_INTERP_F => G_INTERP_F
+      )
+      port map (
+        clk           => clk,
+        rst           => pipe_rst,
+        s_valid       => quad_valid(lane),
+        s_row_first   => quad_row_first(lane),
+        s_plane_first => quad_plane_first(lane),
+        s_plane_last  => quad_plane_last(lane),
+        s_usable_x    => quad_usable_x(lane),
+        s_usable_y    => quad_usable_y(lane),
+        s_fx_left     => quad_fx_left((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        s_fy_left     => quad_fy_left((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        s_fx_right    => quad_fx_right((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        s_fy_right    => quad_fy_right((lane + 1) * G_WEIGHT_W - 1 downto lane * G_WEIGHT_W),
+        s_p00_left    => quad_p00_left((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p10_left    => quad_p10_left((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p01_left    => quad_p01_left((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p11_left    => quad_p11_left((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p00_right   => quad_p00_right((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p10_right   => quad_p10_right((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p01_right   => quad_p01_right((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        s_p11_right   => quad_p11_right((lane + 1) * G_PIX_W - 1 downto lane * G_PIX_W),
+        m_valid       => sample_valid(lane),
+        m_row_first   => sample_row_first(lane),
+        m_plane_first => sample_plane_first(lane),
+        m_plane_last  => sample_plane_last(lane),
+        m_usable_x    => sample_usable_x(lane),
+        m_usable_y    => sample_usable_y(lane),
+        m_l           => sample_l((lane + 1) * C_SAMPLE_W - 1 downto lane * C_SAMPLE_W),
+        m_r           => sample_r((lane + 1) * C_SAMPLE_W - 1 downto lane * C_SAMPLE_W)
+      );
+
+    u_similarity : entity work.similarity
+      generic map (
+        G_WINDOW   => G_WINDOW,
+        G_SAMPLE_W => C_SAMPLE_W,
+        G_MNCC_W   => G_MNCC_W,
+        G_MAX_COLS => G_PLANE_COLS + G_WINDOW - 1
+      )
+      port map (
+        clk           => clk,
+        rst           => pipe_rst,
+        s_valid       => sample_valid(lane),
+        s_row_first   => sample_row_first(lane),
+        s_plane_first => sample_plane_first(lane),
+        s_plane_last  => sample_plane_last(lane),
+        s_usable_x    => sample_usable_x(lane),
+        s_usable_y    => sample_usable_y(lane),
+        s_l           => sample_l((lane + 1) * C_SAMPLE_W - 1 downto lane * C_SAMPLE_W),
+        s_r           => sample_r((lane + 1) * C_SAMPLE_W - 1 downto lane * C_SAMPLE_W),
+        m_valid       => cell_valid(lane),
+        m_last        => cell_last(lane),
+        m_inside      => cell_inside(lane),
+        m_textured    => cell_textured(lane),
+        m_v           => cell_v((lane + 1) * G_MNCC_W - 1 downto lane * G_MNCC_W)
+      );
+
+  end generate g_similarity;
+
+  u_updating : entity work.updating
+    generic map (
+      G_CELLS  => G_PLANE_COLS * G_PLANE_ROWS,
+      G_PLANES => G_PLANES,
+      G_MNCC_W => G_MNCC_W,
+      G_FRAC_W => G_FRAC_W
+    )
+    port map (
+      clk                => clk,
+      rst                => rst,
+      start              => map_start,
+      abort              => map_abort,
+      s_valid            => cell_valid(0),
+      s_last             => cell_last(0),
+      s_inside           => cell_inside(0),
+      s_textured         => cell_textured(0),
+      s_v                => cell_v(G_MNCC_W - 1 downto 0),
+      threshold          => threshold,
+      plane_done         => plane_done,
+      unload             => map_unload,
+      unload_done        => unload_done,
+      m_tvalid           => map_valid,
+      m_tready           => map_ready,
+      m_tdata            => m_map_tdata,
+      m_tlast            => m_map_tlast,
+      dbg_map_we         => dbg_map_we,
+      dbg_map_addr       => dbg_map_addr,
+      dbg_map_best       => dbg_map_best,
+      dbg_map_prev       => dbg_map_prev,
+      dbg_map_plane      => dbg_map_plane,
+      dbg_map_frac       => dbg_map_frac,
+      dbg_map_local_max  => dbg_map_local_max,
+      dbg_map_prev_valid => dbg_map_prev_valid
+    );
+
+  -- In the clock after the abort command updating has not yet heard of it.
+  m_map_tvalid <= map_valid and not map_abort;
+  map_ready    <= m_map_tready and not map_abort;
+
+  dbg_sample_valid <= address_valid;
+  dbg_xi_left      <= address_xi_left;
+  dbg_yi_left      <= address_yi_left;
+  dbg_fx_left      <= address_fx_left;
+  dbg_fy_left      <= address_fy_left;
+  dbg_xi_right     <= address_xi_right;
+  dbg_yi_right     <= address_yi_right;
+  dbg_fx_right     <= address_fx_right;
+  dbg_fy_right     <= address_fy_right;
+  dbg_usable_x     <= address_usable_x;
+  dbg_usable_y     <= address_usable_y;
+  dbg_window_error <= address_window_error;
+  dbg_quad_valid   <= quad_valid;
+  dbg_p00_left     <= quad_p00_left;
+  dbg_p10_left     <= quad_p10_left;
+  dbg_p01_left     <= quad_p01_left;
+  dbg_p11_left     <= quad_p11_left;
+  dbg_p00_right    <= quad_p00_right;
+  dbg_p10_right    <= quad_p10_right;
+  dbg_p01_right    <= quad_p01_right;
+  dbg_p11_right    <= quad_p11_right;
+  dbg_interp_valid <= sample_valid;
+  dbg_l            <= sample_l;
+  dbg_r            <= sample_r;
+  dbg_sim_valid    <= cell_valid;
+  dbg_sim_last     <= cell_last;
+  dbg_sim_inside   <= cell_inside;
+  dbg_sim_textured <= cell_textured;
+  dbg_sim_v        <= cell_v;
+
+end architecture rtl;
