@@ -102,8 +102,8 @@ architecture rtl of control is
   constant C_PLANE_W     : integer := clog2(G_PLANES);
   constant C_TABLE_W     : integer := C_PLANE_W + 3;
   constant C_TABLE_WORDS : integer := 8 * G_PLANES;
-  -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, the pipeline holds fewer than
-  -- 15 of them.
+  -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, so the pipeline (about 100)
+  -- holds fewer than 15.
   constant C_FLIGHT_W    : integer := 4;
 
   -- Registers.

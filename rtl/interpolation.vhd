@@ -5,8 +5,8 @@
 --   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W), result ufix(G_PIX_W,G_INTERP_F), rounded half up;
 --              the result cannot exceed the largest of the four pixels, so there is no saturation
 --   Structure: three linear interpolations a + (b - a) f per image: upper row, lower row, between the rows. Each is one
---              25x18 multiplier with post-adder. Half a unit of the result is added where bits are free: it is 2^(2W-F-1),
---              so for F < W it becomes 2^(W-F-1) on both rows (their difference keeps), else it goes between the rows.
+--              25x18 multiplier with its adders. Half a unit of the result, 2^(2W-F-1), is added where bits are free:
+--              for F < W as 2^(W-F-1) on both rows (their difference stays the same), else between the rows.
 --   Unusable : the sample is 0 unless usable in x and y
 --   Reset    : clears m_valid's way; data have no reset
 --   Golden   : sw/golden/interpolation.hpp
