@@ -8,7 +8,7 @@
 --               + tile_cols * tile_rows + a constant of the configuration        (sw/golden/control.hpp, checked by the
 --               bench; port tile_clocks counts them)
 --   Numbers   : docs/numeric_contract.md
---   Lanes     : address_generator, interpolation and similarity are per lane; bundles between entities hold lane 0 in the
+--   Lanes     : address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the
 --               low bits. G_LANES = 1 in this version
 --   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
 --   dbg_*     : outputs of the stages for waves and tests; leave open
