@@ -10,6 +10,7 @@
 #include "app/options.hpp"
 #include "app/run_record.hpp"
 #include "core/error.hpp"
+#include "eval/cleanup.hpp"
 #include "io/image_io.hpp"
 #include "io/output_dir.hpp"
 #include "io/pfm.hpp"
@@ -105,6 +106,12 @@ void depth_command(const DepthOptions& o) {
   if (!o.cleanup && (o.no_uniqueness || o.no_speckle)) {
     throw InputError("--no-uniqueness, --no-speckle: need --cleanup");
   }
+  if (o.engine == "float" && (o.interp_bits || o.weight_bits || !o.tile.empty())) {
+    throw InputError("--interp-bits, --weight-bits, --tile: not with --engine float, which neither rounds nor tiles");
+  }
+  if (o.engine == "float" && o.frac_bits && !o.mncc_bits) {
+    throw InputError("--frac-bits: with --engine float only together with --mncc-bits");
+  }
   Gray left = read_gray(o.left);
   Gray right = read_gray(o.right);
   if (left.width != right.width || left.height != right.height) {
@@ -143,11 +150,19 @@ void depth_command(const DepthOptions& o) {
   EngineRun run;
   {
     Progress bar(o.engine, o.quiet);
-    run = run_engine(o.engine, left, right, setup, o.tile, o.configuration, o.threads,
-                     [&](size_t done, size_t total) { bar.update(done, total); });
+    EngineRequest request{o.engine, setup, o.threshold, {}, o.tile, o.configuration, o.threads};
+    if (o.mncc_bits) request.rounding.mncc_bits = *o.mncc_bits;
+    if (o.frac_bits) request.rounding.frac_bits = *o.frac_bits;
+    run = run_engine(request, left, right, [&](size_t done, size_t total) { bar.update(done, total); });
   }
   DepthResult& result = run.result;
-  if (o.cleanup) throw InputError("--cleanup: not part of this build");
+  if (o.cleanup) {
+    CleanupOptions cleanup;
+    cleanup.uniqueness = !o.no_uniqueness;
+    cleanup.speckle = !o.no_speckle;
+    cleanup.uniqueness_m = 0.02 * setup.spacing.zmin;  // the rover's 2 cm at 1 m, in any unit of depth
+    clean_up(result, setup.rig, cleanup);
+  }
 
   const double fb = setup.rig.cyclopean().fx * setup.rig.baseline;
   const FloatImage disparity = left_disparity(setup.rig, result.depth);

@@ -53,7 +53,7 @@ EngineRun run_fixed_engine(const Gray& left, const Gray& right, SweepSetup setup
   describe_tiles(plan, run);
   const auto start = Clock::now();
   FastOptions options;
-  options.threads = threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  options.threads = threads;
   options.progress = [&](double share) { progress(static_cast<size_t>(share * 1000), 1000); };
   const Image<golden::MapCell> map = run_fixed(left, right, setup, options);
   run.result = to_result(setup, map);
@@ -180,19 +180,25 @@ golden::Config configuration_named(const std::string& name) {
 #endif
 }
 
-EngineRun run_engine(const std::string& engine, const Gray& left, const Gray& right, SweepSetup setup,
-                     const std::string& tile, const std::string& configuration, int threads,
-                     const ProgressCall& progress) {
-  if (engine == "fixed") return run_fixed_engine(left, right, std::move(setup), tile, threads, progress);
+EngineRun run_engine(const EngineRequest& r, const Gray& left, const Gray& right, const ProgressCall& progress) {
+  const int threads = r.threads > 0 ? r.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  if (r.engine == "fixed") return run_fixed_engine(left, right, r.setup, r.tile, threads, progress);
+  if (r.engine == "float") {
+    EngineRun run;
+    const auto start = Clock::now();
+    run.result = run_float(left, right, r.setup.rig, r.setup.spacing, r.setup.format.window, r.threshold, r.rounding,
+                           threads, [&](double share) { progress(static_cast<size_t>(share * 1000), 1000); });
+    run.seconds = since(start);
+    return run;
+  }
 #ifdef PSWEEP_HAVE_RTL
-  if (engine == "rtl") return run_rtl_engine(left, right, std::move(setup), tile, configuration, threads, progress);
+  if (r.engine == "rtl") return run_rtl_engine(left, right, r.setup, r.tile, r.configuration, threads, progress);
 #else
-  (void)configuration;
-  if (engine == "rtl") {
+  if (r.engine == "rtl") {
     throw InputError("--engine: found 'rtl', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
   }
 #endif
-  throw InputError("--engine: found '" + engine + "', expected float, fixed or rtl");
+  throw InputError("--engine: found '" + r.engine + "', expected float, fixed or rtl");
 }
 
 }  // namespace psweep

@@ -9,6 +9,7 @@
 
 #include "core/result.hpp"
 #include "plan/planner.hpp"
+#include "reference/reference.hpp"
 
 namespace psweep {
 
@@ -29,11 +30,18 @@ struct EngineRun {
 
 using ProgressCall = std::function<void(size_t done, size_t total)>;
 
-// `tile`: "WxH" or empty. `configuration`: name of an RTL configuration or empty.
+struct EngineRequest {
+  std::string engine;         // float, fixed, rtl
+  SweepSetup setup;           // float uses rig, planes and window only
+  double threshold = 0;       // float: 0 .. 1
+  FloatOptions rounding;      // float
+  std::string tile;           // "WxH" or empty
+  std::string configuration;  // rtl: name of a configuration or empty
+  int threads = 0;            // 0: one per core
+};
+
 // Errors: InputError, also if no built configuration serves the request (with the command that builds one).
-EngineRun run_engine(const std::string& engine, const Gray& left, const Gray& right, SweepSetup setup,
-                     const std::string& tile, const std::string& configuration, int threads,
-                     const ProgressCall& progress);
+EngineRun run_engine(const EngineRequest& request, const Gray& left, const Gray& right, const ProgressCall& progress);
 
 // Generics of a built configuration. InputError if there is none of this name, or no RTL in this binary.
 golden::Config configuration_named(const std::string& name);

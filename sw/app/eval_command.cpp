@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // psweep eval: metres against metres in the cyclopean eye (paper, section 3.2), or disparities of the left image
 // against a Middlebury ground truth. With an output directory as DEPTH, report.json and error.png are updated.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "app/disparity_metrics.hpp"
 #include "app/options.hpp"
 #include "app/run_record.hpp"
 #include "core/error.hpp"
+#include "eval/metrics.hpp"
 #include "io/calibration.hpp"
 #include "io/image_io.hpp"
 #include "io/output_dir.hpp"
@@ -28,6 +31,15 @@ void check_size(const std::string& name, int width, int height, const std::strin
     throw InputError(name + ": the image is " + std::to_string(width) + "x" + std::to_string(height) + ", but " +
                      other + " is " + std::to_string(w) + "x" + std::to_string(h));
   }
+}
+
+// Next of 1, 2, 5, 10, .. above.
+double round_scale(double v) {
+  const double decade = std::pow(10, std::floor(std::log10(v)));
+  for (const double m : {1.0, 2.0, 5.0}) {
+    if (decade * m >= v * 0.999) return decade * m;
+  }
+  return decade * 10;
 }
 
 bool is_pfm(const fs::path& path) { return read_file(path).compare(0, 2, "Pf") == 0; }
@@ -87,7 +99,30 @@ void eval_command(const EvalOptions& o) {
                {"mean_px", m.mean_px}};
     picture = error_picture(disparity, truth, 1, 4, "px");
   } else {
-    throw InputError(o.truth + ": evaluation in metres is not part of this build");
+    FloatImage truth = read_pfm(o.truth);
+    check_size(o.truth, truth.width, truth.height, map_file.string(), depth.width, depth.height);
+    if (!record.metric) {
+      throw InputError(map_file.string() + ": depths are relative (--disparity-range), but " + o.truth +
+                       " is in metres");
+    }
+    const Metrics m = evaluate(depth, truth, record.rig, record.spacing, record.window);
+    metrics = {{"truth", o.truth},
+               {"evaluated", m.evaluated},
+               {"reconstructed", m.reconstructed},
+               {"M1_mm", m.M1_mm},
+               {"M2a_percent", m.M2a_percent},
+               {"M2b_mm", m.M2b_mm},
+               {"M3_percent", m.M3_percent},
+               {"M4_px", m.M4_px},
+               {"rms_mm", m.rms_mm},
+               {"holes", m.holes}};
+    // Errors grow with 1 / (f b): 20 mm is full scale on the rover's rig at full size, others get their share.
+    const double full = 20 * 1200 * 0.2 / (record.rig.cyclopean().fx * record.rig.baseline);
+    const auto evaluated = evaluated_cells(truth, record.rig, record.spacing, record.window);
+    for (size_t i = 0; i < truth.data.size(); ++i) {
+      if (!evaluated.data[i]) truth.data[i] = std::numeric_limits<float>::infinity();
+    }
+    picture = error_picture(depth, truth, 1000, round_scale(full), "mm");
   }
 
   if (directory) {

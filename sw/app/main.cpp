@@ -105,8 +105,11 @@ void add_render(CLI::App& app, RenderOptions& o) {
       ->check(CLI::Range(64, 2240))
       ->capture_default_str();
   c->add_option("-o,--output", o.output, "Directory for the results")->required();
+  c->add_option("--threads", o.threads, "Threads; 0: one per core. Results do not depend on it")
+      ->check(CLI::Range(0, 256));
   c->add_flag("-q,--quiet", o.quiet, "No progress bar, no summary");
   c->footer("Example:\n  psweep render --kind rocky --seed 1 --size 1120 -o scene\n");
+  c->callback([&o] { render_command(o); });
 }
 
 void add_eval(CLI::App& app, EvalOptions& o) {
@@ -159,11 +162,15 @@ int run(int argc, char** argv) {
   ReportOptions report;
   add_depth(app, depth);
 
-  (void)add_render;
-  (void)render;
+  add_render(app, render);
   add_eval(app, eval);
   add_report(app, report);
   try {
+    // CLI11 itself would only say that a subcommand is missing.
+    if (argc > 1 && argv[1][0] != '-' &&
+        app.get_subcommands([&](CLI::App* c) { return c->get_name() == argv[1]; }).empty()) {
+      throw InputError("unknown command '" + std::string(argv[1]) + "', expected depth, render, eval or report");
+    }
     app.parse(argc, argv);
     return 0;
   } catch (const CLI::Success& e) {  // --help, --version

@@ -2,6 +2,7 @@
 // Options of the subcommands as the user gave them; an empty optional takes its default from the calibration or the
 // configuration. Ranges are checked by the parser (main.cpp), combinations by the commands.
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,8 +29,9 @@ struct DepthOptions {
 
 struct RenderOptions {
   std::string kind = "rocky", output;
-  unsigned seed = 1;
+  uint64_t seed = 1;
   int size = 1120;
+  int threads = 0;
   bool quiet = false;
 };
 

@@ -217,7 +217,8 @@ void report_command(const ReportOptions& o) {
   bool errors = false;
   for (const auto& run : runs) errors = errors || fs::exists(run.dir / "error.png");
   if (errors) {
-    page << "<h2>Error against ground truth</h2>\n<p>Grey: truth, but no depth. Black: no truth.</p>\n<div "
+    page << "<h2>Error against ground truth</h2>\n<p>Blue: no depth found. Light grey: not evaluated (no truth, or the "
+            "window leaves an image).</p>\n<div "
             "class=\"row\">\n";
     for (const auto& run : runs) {
       if (fs::exists(run.dir / "error.png")) page << figure(read_file(run.dir / "error.png"), run.engine());

@@ -18,9 +18,13 @@ namespace {
 
 constexpr int kMaxSide = 65535;
 
+// Shortest text that reads back as the same double.
 std::string number(double v) {
   char text[40];
-  std::snprintf(text, sizeof text, "%.17g", v);
+  for (int digits = 15; digits <= 17; ++digits) {
+    std::snprintf(text, sizeof text, "%.*g", digits, v);
+    if (std::strtod(text, nullptr) == v) break;
+  }
   return text;
 }
 

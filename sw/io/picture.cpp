@@ -74,7 +74,7 @@ cv::Mat with_bar(const cv::Mat& picture, const std::vector<cv::Vec3b>& table, bo
     if (y < top || y > bottom || last - y < 15) continue;  // labels must not overlap
     last = y;
     cv::line(out, cv::Point(left + kBarWidth, y), cv::Point(left + kBarWidth + 4, y), kInk, 1);
-    cv::putText(out, tick.label, cv::Point(left + kBarWidth + 8, std::clamp(y + 4, 10, rows - 3)), font, size, kInk, 1,
+    cv::putText(out, tick.label, cv::Point(left + kBarWidth + 9, std::clamp(y + 4, 10, rows - 3)), font, size, kInk, 1,
                 cv::LINE_AA);
   }
   return out;
@@ -107,13 +107,13 @@ cv::Mat depth_picture(const FloatImage& depth, const PlaneSpacing& range, bool m
 cv::Mat error_picture(const FloatImage& value, const FloatImage& truth, double scale, double full,
                       const std::string& unit) {
   const auto table = palette(cv::COLORMAP_INFERNO);
-  cv::Mat out(value.height, value.width, CV_8UC3, cv::Vec3b(0, 0, 0));
+  cv::Mat out(value.height, value.width, CV_8UC3, cv::Scalar(226, 226, 226));
   for (int y = 0; y < value.height; ++y) {
     for (int x = 0; x < value.width; ++x) {
       if (!std::isfinite(truth.at(x, y))) continue;
       const double v = value.at(x, y);
       out.at<cv::Vec3b>(y, x) =
-          std::isfinite(v) ? colour(table, std::abs(v - truth.at(x, y)) * scale / full) : cv::Vec3b(150, 150, 150);
+          std::isfinite(v) ? colour(table, std::abs(v - truth.at(x, y)) * scale / full) : cv::Vec3b(190, 120, 40);
     }
   }
   std::vector<Tick> ticks;

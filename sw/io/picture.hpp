@@ -18,8 +18,8 @@ namespace psweep {
 cv::Mat depth_picture(const FloatImage& depth, const PlaneSpacing& range, bool metric = true,
                       double focal_baseline = 0);
 
-// |value - truth| from 0 (dark) to `full` and beyond (bright); grey where only the truth exists (a hole), black where
-// there is no truth. `scale` converts to the unit of the legend (1000 for m to mm).
+// |value - truth| from 0 (dark) to `full` and beyond (bright); blue where only the truth exists (a hole), light grey
+// where there is no truth. `scale` converts to the unit of the legend (1000 for m to mm).
 cv::Mat error_picture(const FloatImage& value, const FloatImage& truth, double scale, double full,
                       const std::string& unit);
 
