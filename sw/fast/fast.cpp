@@ -4,6 +4,7 @@
 #include "fast/fast.hpp"
 
 #include <atomic>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -64,21 +65,23 @@ class Aligned {
   std::unique_ptr<T, FreeAligned<T>> data_;
 };
 
-const SweepLevel& sweep_level(SimdLevel level) {
-#ifdef PSWEEP_X86
-  if (level == SimdLevel::kAvx512) return fast::kSweepAvx512;
-  if (level == SimdLevel::kAvx2) return fast::kSweepAvx2;
-#endif
-  (void)level;
-  return fast::kSweepPlain;
+// Widest numbers that the sums of a format need, samples centred on zero. With n = M*M and samples within +-h: vertical
+// sums M h, window sums of squares 2 n h^2, their products n * 2 n h^2.
+fast::SumWidth sum_width(const Config& c) {
+  const double half = std::ldexp(1.0, c.sample_bits() - 1), m = c.window, squares = m * m * 2 * half * half;
+  if (m * half <= 32767 && squares <= 2147483647.0) return fast::SumWidth::k32;
+  return m * m * squares <= std::ldexp(1.0, 52) ? fast::SumWidth::k53 : fast::SumWidth::k64;
 }
 
-// The vector sweeps keep samples in 16 bits and window sums in 32, all centred on zero.
-bool simd_fits(const Config& c) {
-  const int bits = c.sample_bits();
-  if (bits > 15) return false;
-  const int64_t half = int64_t{1} << (bits - 1), m = c.window;
-  return m * half <= 32767 && m * m * 2 * half * half <= 2147483647;
+const SweepLevel& sweep_level(SimdLevel level, fast::SumWidth sums) {
+#ifdef PSWEEP_X86
+  const bool strided = sums == fast::SumWidth::k32;
+  if (level == SimdLevel::kAvx512) return strided ? fast::kStridedAvx512 : fast::kRasterAvx512;
+  if (level == SimdLevel::kAvx2) return strided ? fast::kStridedAvx2 : fast::kRasterAvx2;
+#endif
+  (void)level;
+  (void)sums;
+  return fast::kRasterPlain;
 }
 
 // The planes' weights are constant and their rows whole pixels: interpolation is one multiply-add per pixel of 16 bits.
@@ -101,68 +104,39 @@ bool unit_steps(const Region& r) {
   return true;
 }
 
-// Interpolated pixels of a band in raster order, for anything but unit steps. Vertical interpolation comes first (the
-// bilinear form is exact, so the order does not matter) and is kept over the planes as long as rows do not move.
-class Filler {
+// Vertically interpolated rows of a band's pictures. Vertical interpolation comes first (the bilinear form is exact, so
+// the order does not matter) and is kept over the planes as long as rows do not move: with a rig they never do.
+class BlendedRows {
  public:
-  Filler(const Region& region, int first_row, int rows) : region_(region), first_row_(first_row), rows_(rows) {}
+  BlendedRows(const Region& region, int first_row, int rows) : region_(region), first_row_(first_row), rows_(rows) {}
 
-  static void fill(const void* context, int plane, int row, int32_t* l, int32_t* r) {
-    auto* self = const_cast<Filler*>(static_cast<const Filler*>(context));
-    const PlaneLines& p = self->region_.planes[static_cast<size_t>(plane)];
-    self->image_row(self->left_, self->region_.left, p.left_x, p.left_y, p, row, l);
-    self->image_row(self->right_, self->region_.right, p.right_x, p.right_y, p, row, r);
+  static fast::RowSource rows_of(void* context, int k) {
+    auto* self = static_cast<BlendedRows*>(context);
+    const PlaneLines& p = self->region_.planes[static_cast<size_t>(k)];
+    self->blend(self->left_, self->region_.left, p.left_y);
+    self->blend(self->right_, self->region_.right, p.right_y);
+    return {self->left_.data.data(), self->right_.data.data(), self->region_.left.width, self->region_.right.width};
   }
 
  private:
   struct Rows {
     Line y;
-    bool known = false;
     std::vector<int32_t> data;  // rows_ x picture width, ufix(pix_bits, weight_bits)
   };
 
-  int32_t weight(int64_t pos) const {
-    const int w = region_.format.weight_bits;
-    return static_cast<int32_t>(pos >> (golden::kPosFrac - w)) & ((1 << w) - 1);
-  }
-
-  void blend_rows(Rows& rows, const golden::Pixels& picture, const Line& y) const {
+  void blend(Rows& rows, const golden::Pixels& picture, const Line& y) const {
+    if (!rows.data.empty() && rows.y == y) return;
     const int w = region_.format.weight_bits, width = picture.width;
     rows.y = y;
-    rows.known = true;
     rows.data.resize(static_cast<size_t>(rows_) * width);
     for (int j = 0; j < rows_; ++j) {
       const int64_t pos = y.at(first_row_ + j);
       const int yi = static_cast<int>(std::clamp<int64_t>(pos >> golden::kPosFrac, 0, picture.height - 1));
-      const int32_t fy = weight(pos);
+      const int32_t fy = static_cast<int32_t>(pos >> (golden::kPosFrac - w)) & ((1 << w) - 1);
       const uint16_t* top = picture.row(yi);
       const uint16_t* bottom = picture.row(std::min(yi + 1, picture.height - 1));
       int32_t* target = rows.data.data() + static_cast<size_t>(j) * width;
       for (int x = 0; x < width; ++x) target[x] = (top[x] << w) + (bottom[x] - top[x]) * fy;
-    }
-  }
-
-  void image_row(Rows& rows, const golden::Pixels& picture, const Line& x, const Line& y, const PlaneLines& p, int row,
-                 int32_t* out) {
-    if (!rows.known || !(rows.y == y)) blend_rows(rows, picture, y);
-    const Config& c = region_.format;
-    const int w = c.weight_bits, drop = 2 * w - c.interp_frac, count = region_.cols + c.window - 1;
-    const int32_t* source = rows.data.data() + static_cast<size_t>(row) * picture.width;
-    // Only samples of valid cells are defined; they and their neighbours are inside the picture.
-    const int lo = p.valid.u_lo, hi = p.valid.u_hi + c.window - 1;
-    std::memset(out, 0, static_cast<size_t>(count) * sizeof(int32_t));
-    const bool narrow = c.pix_bits + 2 * w <= 30;
-    for (int i = lo; i < hi; ++i) {
-      const int64_t pos = x.at(i);
-      const int32_t* at = source + (pos >> golden::kPosFrac);
-      const int32_t fx = weight(pos);
-      if (narrow) {
-        const int32_t exact = (at[0] << w) + (at[1] - at[0]) * fx;
-        out[i] = drop > 0 ? (exact + (1 << (drop - 1))) >> drop : exact << -drop;
-      } else {
-        const int64_t exact = (static_cast<int64_t>(at[0]) << w) + static_cast<int64_t>(at[1] - at[0]) * fx;
-        out[i] = static_cast<int32_t>(drop > 0 ? (exact + (int64_t{1} << (drop - 1))) >> drop : exact << -drop);
-      }
     }
   }
 
@@ -183,7 +157,7 @@ class BandSweep {
         taps_(stride_ + region.format.window - 1),
         row_len_((stride_ * lanes_ + 31) / 32 * 32),
         sample_rows_(rows + region.format.window - 1),
-        filler_(region, first_row, sample_rows_),
+        blended_(region, first_row, sample_rows_),
         planes_(plane_work(rows)),
         map_(static_cast<size_t>(rows) * row_len_ * 5),
         textured_(static_cast<size_t>(rows) * stride_),
@@ -191,6 +165,7 @@ class BandSweep {
         v_(static_cast<size_t>(row_len_)),
         ring_(static_cast<size_t>(region.format.window) * taps_ * lanes_ * 2),
         column_(static_cast<size_t>(taps_) * lanes_ * 4),
+        windows_(static_cast<size_t>(taps_) * 4),
         line_(2 * (static_cast<size_t>(stride_) * lanes_ + region.format.window - 1)) {
     const Config& c = region.format;
     band_.window = c.window;
@@ -212,8 +187,9 @@ class BandSweep {
     }
     band_.left = left_ ? left_->get() : nullptr;
     band_.right = right_ ? right_->get() : nullptr;
-    band_.fill = Filler::fill;
-    band_.fill_context = &filler_;
+    band_.rows_of = BlendedRows::rows_of;
+    band_.rows_context = &blended_;
+    band_.sums = sum_width(c);
     band_.planes = planes_.data();
     const size_t words = static_cast<size_t>(rows) * row_len_;
     band_.best = map_.get();
@@ -231,6 +207,7 @@ class BandSweep {
     band_.v = v_.get();
     band_.ring = ring_.get();
     band_.column = column_.get();
+    band_.windows = windows_.get();
     band_.line = line_.get();
     band_.trace_v = nullptr;
     band_.trace_l = band_.trace_r = nullptr;
@@ -320,6 +297,10 @@ class BandSweep {
       w.v_lo = std::max(p.valid.v_lo - first_row_, 0);
       w.v_hi = std::min(p.valid.v_hi - first_row_, rows);
       w.empty = w.u_lo >= w.u_hi || w.v_lo >= w.v_hi;
+      w.left_start = p.left_x.start;
+      w.right_start = p.right_x.start;
+      w.left_step = static_cast<uint32_t>(p.left_x.step);
+      w.right_step = static_cast<uint32_t>(p.right_x.step);
       if (w.empty) w.u_lo = w.u_hi = w.v_lo = w.v_hi = 0;
       work.push_back(w);
     }
@@ -366,11 +347,11 @@ class BandSweep {
   const Region& region_;
   const SweepLevel& level_;
   int first_row_, lanes_, stride_, taps_, row_len_, sample_rows_;
-  Filler filler_;
+  BlendedRows blended_;
   std::vector<PlaneWork> planes_;
   Aligned<uint16_t> map_, textured_, cell_index_, v_;
   Aligned<int32_t> ring_;
-  Aligned<int64_t> column_;
+  Aligned<int64_t> column_, windows_;
   Aligned<int32_t> line_;
   std::unique_ptr<Aligned<uint8_t>> left_, right_;
   std::unique_ptr<Aligned<uint16_t>> trace_v_;
@@ -389,9 +370,8 @@ int default_band_rows(const Region& r) {
 // Calls done(v, cells) for every row v of the region; rows are given once each, from several threads.
 template <class Done>
 void sweep_region(const Region& region, const FastOptions& options, Done&& done) {
-  const SimdLevel wanted = simd_fits(region.format) ? options.level : SimdLevel::kPlain;
-  const SweepLevel& level = sweep_level(wanted);
-  const bool unit = wanted != SimdLevel::kPlain && unit_steps(region);
+  const SweepLevel& level = sweep_level(options.level, sum_width(region.format));
+  const bool unit = level.lanes > 1 && unit_steps(region);
   const int planes = static_cast<int>(region.planes.size());
   std::vector<golden::MapCell> row(static_cast<size_t>(region.cols));
   if (options.trace) {

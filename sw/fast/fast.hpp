@@ -12,8 +12,8 @@
 
 namespace psweep {
 
-// Instruction sets, ascending. kPlain: portable C++, any processor, any format. The wider ones serve formats whose
-// window sums fit 32 bits (pixel plus interpolation bits up to 12 at M = 13, 11 at M = 21) and fall back to kPlain.
+// Instruction sets, ascending. kPlain: portable C++, any processor. Every level serves every format; the wider ones are
+// fastest where window sums fit 32 bits (pixel plus interpolation bits up to 12 at M = 13, 11 at M = 21).
 enum class SimdLevel { kPlain, kAvx2, kAvx512 };
 const char* simd_name(SimdLevel level);
 // Widest level of this machine; the environment variable PSWEEP_SIMD (plain, avx2, avx512) lowers it.

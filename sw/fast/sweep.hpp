@@ -16,9 +16,21 @@ namespace psweep::fast {
 struct PlaneWork {
   bool empty = true;                           // no valid cell in this band
   int u_lo = 0, u_hi = 0, v_lo = 0, v_hi = 0;  // valid cells
+  int64_t left_start = 0, right_start = 0;     // x of sample 0, 19 fraction bits, in pixels of the picture
+  uint32_t left_step = 0, right_step = 0;      // per sample
   int left_first = 0, right_first = 0;         // unit steps: vector of the strided source that holds sample 0 of lane 0
   int left_weight = 0, right_weight = 0;       // unit steps: fx, the same for the whole plane
 };
+
+// Vertically interpolated rows of both pictures, ufix(pix_bits, weight_bits): one row per row of samples.
+struct RowSource {
+  const int32_t* left;
+  const int32_t* right;
+  int left_width, right_width;
+};
+
+// What the window sums need: 32 bits; 64 bits, but all products of sums exact in doubles; 64 bits.
+enum class SumWidth { k32, k53, k64 };
 
 struct Band {
   // Format.
@@ -28,14 +40,14 @@ struct Band {
   int stride, taps;  // see above
   int row_len;       // elements of a row of map words: stride * lanes, rounded up to 32
   const PlaneWork* planes;
-  // Samples. Unit steps without vertical fraction: pixels in strided layout (source_len elements a row, same taps
-  // order, one row per row of samples). Otherwise null, and fill() writes the interpolated pixels of a row in raster
-  // order.
+  SumWidth sums;
+  // Samples. Unit steps without vertical fraction: pixels in strided layout, left_len elements per row of samples.
+  // Otherwise null, and rows_of() gives the rows that plane k interpolates from.
   const uint8_t* left;
   const uint8_t* right;
   size_t left_len, right_len;
-  void (*fill)(const void* context, int plane, int row, int32_t* l, int32_t* r);
-  const void* fill_context;
+  RowSource (*rows_of)(void* context, int k);
+  void* rows_context;
   // Map words: rows * row_len elements, zero before the first plane but for plane = kNoPlane.
   uint16_t* best;
   uint16_t* prev;
@@ -48,7 +60,8 @@ struct Band {
   uint16_t* v;                 // row_len
   int32_t* ring;               // window * taps * lanes * 2
   void* column;                // taps * lanes * 4 * 8 bytes
-  int32_t* line;               // 2 * (cols + M - 1 + lanes * stride): fill()'s rows
+  void* windows;               // taps * 4 * 8 bytes, raster sweep only
+  int32_t* line;               // 2 * (stride * lanes + window - 1), zero at first: rows of samples in raster order
   // Trace, or null: V and samples of the (single) plane swept.
   uint16_t* trace_v;  // rows * row_len
   int32_t* trace_l;   // (rows + M - 1) * taps * lanes, strided
@@ -63,8 +76,8 @@ struct SweepLevel {
   // The winner of element `at` (row * row_len + t * lanes + lane) is a local maximum.
   bool (*local_max)(const Band& band, size_t at);
 };
-extern const SweepLevel kSweepPlain;
-extern const SweepLevel kSweepAvx2;
-extern const SweepLevel kSweepAvx512;
+// Strided, for SumWidth::k32 only; and raster, for any.
+extern const SweepLevel kStridedAvx2, kStridedAvx512;
+extern const SweepLevel kRasterPlain, kRasterAvx2, kRasterAvx512;
 
 }  // namespace psweep::fast

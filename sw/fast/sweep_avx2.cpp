@@ -7,7 +7,7 @@
 namespace psweep::fast {
 namespace {
 
-constexpr uint16_t kPrevValid = 1, kLocalMax = 2;
+#include "fast/sweep_raster.inc"
 
 struct Lanes {
   static constexpr int kLanes = 8;
@@ -147,12 +147,11 @@ void update_row(const Band& b, int row, int k, int u_lo, int u_hi) {
   }
 }
 
-bool local_max(const Band& b, size_t at) { return (b.flags[at] & kLocalMax) != 0; }
-
 #include "fast/sweep_simd.inc"
 
 }  // namespace
 
-const SweepLevel kSweepAvx2 = {Lanes::kLanes, sweep, local_max};
+const SweepLevel kStridedAvx2 = {Lanes::kLanes, sweep_strided, local_max_raster};
+const SweepLevel kRasterAvx2 = {1, sweep_raster, local_max_raster};
 
 }  // namespace psweep::fast

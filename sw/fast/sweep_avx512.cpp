@@ -7,6 +7,8 @@
 namespace psweep::fast {
 namespace {
 
+#include "fast/sweep_raster.inc"
+
 struct Lanes {
   static constexpr int kLanes = 16;
   using I = __m512i;
@@ -154,6 +156,7 @@ bool local_max(const Band& b, size_t at) {
 
 }  // namespace
 
-const SweepLevel kSweepAvx512 = {Lanes::kLanes, sweep, local_max};
+const SweepLevel kStridedAvx512 = {Lanes::kLanes, sweep_strided, local_max};
+const SweepLevel kRasterAvx512 = {1, sweep_raster, local_max_raster};
 
 }  // namespace psweep::fast
