@@ -48,13 +48,13 @@ class VerilatedEngine : public EngineModel {
                 2 * uint64_t(job.planes) * (uint64_t(golden::sweep_cols(config_, job)) + 64) *
                     (uint64_t(golden::sweep_rows(config_, job)) + 8);
     try {
-      write({kCommand, kClear});
+      write({golden::kRegCommand, golden::kCommandClear});
       if (!table_written_) {
         for (const auto& w : table_writes(table_)) write(w);
         table_written_ = true;
       }
       for (const auto& w : job_writes(job)) write(w);
-      write({kCommand, kStart});
+      write({golden::kRegCommand, golden::kCommandStart});
       TileOutput out;
       out.cells.reserve(size_t(job.tile_cols) * job.tile_rows);
       send_pixels(job, left, right, out);
@@ -64,7 +64,7 @@ class VerilatedEngine : public EngineModel {
       out.errors = dut_->errors;
       out.window_errors = dut_->window_errors;
       publish();
-      if (out.errors & ~unsigned{kErrorWindow} || out.cells.size() != size_t(job.tile_cols) * job.tile_rows)
+      if (out.errors & ~unsigned{golden::kErrorWindow} || out.cells.size() != size_t(job.tile_cols) * job.tile_rows)
         throw EngineError("rtl engine: tile failed, errors: " + error_names(out.errors) + "; " +
                           std::to_string(out.cells.size()) + " of " +
                           std::to_string(size_t(job.tile_cols) * job.tile_rows) + " cells came out");
@@ -119,8 +119,8 @@ class VerilatedEngine : public EngineModel {
     const size_t count = size_t(job.win_cols) * job.win_rows;
     dut_->s_pix_tvalid = 1;
     for (size_t i = 0; i < count;) {
-      dut_->s_pix_tdata = static_cast<decltype(+dut_->s_pix_tdata)>(unsigned{right.data[i]} << config_.pix_bits |
-                                                                    unsigned{left.data[i]});
+      const unsigned beat = unsigned{right.data[i]} << config_.pix_bits | unsigned{left.data[i]};
+      dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
       dut_->s_pix_tlast = i + 1 == count;
       low();
       const bool taken = dut_->s_pix_tready;

@@ -1,41 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Register map, map-word format and error bits of entity psweep (docs/interfaces.md), for whoever talks to its streams.
+// Words on the streams of entity psweep (docs/interfaces.md): register writes of a tile and of the plane table, map
+// cells, names of the error bits. Addresses and bits themselves: golden/control.hpp.
 #pragma once
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "golden/config.hpp"
+#include "golden/control.hpp"
 
 namespace psweep::rtl {
-
-enum Register : uint16_t {
-  kCommand = 0x0000,
-  kTileCols = 0x0001,
-  kTileRows = 0x0002,
-  kWinCols = 0x0003,
-  kWinRows = 0x0004,
-  kPlanes = 0x0005,
-  kThreshold = 0x0006,
-  kTxLeft = 0x0008,
-  kTyLeft = 0x0009,
-  kTxRight = 0x000A,
-  kTyRight = 0x000B,
-  kLeftBounds = 0x0010,   // x_lo, x_hi, y_lo, y_hi
-  kRightBounds = 0x0014,  // likewise
-  kTable = 0x8000,        // + 8 * plane + field
-};
-enum Command : uint32_t { kStart = 1, kAbort = 2, kClear = 4 };
-enum State { kIdle = 0, kLoad = 1, kSweep = 2, kFlush = 3, kUnload = 4, kDrain = 5 };
-enum ErrorBit : uint8_t {
-  kErrorConfig = 1 << 0,
-  kErrorTable = 1 << 1,
-  kErrorShort = 1 << 2,
-  kErrorLong = 1 << 3,
-  kErrorWindow = 1 << 4,
-  kErrorAddress = 1 << 5,
-  kErrorBusy = 1 << 6,
-};
 
 struct RegisterWrite {
   uint16_t address;
@@ -45,17 +18,25 @@ struct RegisterWrite {
 
 inline std::vector<RegisterWrite> job_writes(const golden::TileJob& t) {
   auto u = [](int v) { return static_cast<uint32_t>(v); };
+  auto offset = [](int i) { return static_cast<uint16_t>(golden::kRegTx + i); };
   std::vector<RegisterWrite> w = {
-      {kTileCols, u(t.tile_cols)}, {kTileRows, u(t.tile_rows)},  {kWinCols, u(t.win_cols)}, {kWinRows, u(t.win_rows)},
-      {kPlanes, u(t.planes)},      {kThreshold, u(t.threshold)}, {kTxLeft, u(t.tx_left)},   {kTyLeft, u(t.ty_left)},
-      {kTxRight, u(t.tx_right)},   {kTyRight, u(t.ty_right)},
+      {golden::kRegTileCols, u(t.tile_cols)},
+      {golden::kRegTileRows, u(t.tile_rows)},
+      {golden::kRegWinCols, u(t.win_cols)},
+      {golden::kRegWinRows, u(t.win_rows)},
+      {golden::kRegPlanes, u(t.planes)},
+      {golden::kRegThreshold, u(t.threshold)},
+      {offset(0), u(t.tx_left)},
+      {offset(1), u(t.ty_left)},
+      {offset(2), u(t.tx_right)},
+      {offset(3), u(t.ty_right)},
   };
   auto bounds = [&](uint16_t base, const golden::Bounds& b) {
     const int values[] = {b.x_lo, b.x_hi, b.y_lo, b.y_hi};
     for (int i = 0; i < 4; ++i) w.push_back({static_cast<uint16_t>(base + i), u(values[i])});
   };
-  bounds(kLeftBounds, t.left);
-  bounds(kRightBounds, t.right);
+  bounds(golden::kRegLeft, t.left);
+  bounds(golden::kRegRight, t.right);
   return w;
 }
 
@@ -71,7 +52,7 @@ inline std::vector<RegisterWrite> table_writes(const std::vector<golden::PlaneEn
                                 p.dy_left,
                                 p.dx_right,
                                 p.dy_right};
-    for (size_t f = 0; f < 8; ++f) w.push_back({static_cast<uint16_t>(kTable + 8 * k + f), fields[f]});
+    for (size_t f = 0; f < 8; ++f) w.push_back({static_cast<uint16_t>(golden::kRegTable + 8 * k + f), fields[f]});
   }
   return w;
 }

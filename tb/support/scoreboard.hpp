@@ -32,7 +32,10 @@ class Scoreboard {
 
   explicit Scoreboard(std::string stage) : stage_(std::move(stage)) {}
 
-  void expect(uint64_t value, const Place& place = {}) { expected_.push_back({value, place}); }
+  // Bits outside `mask` are not compared (they mean nothing there).
+  void expect(uint64_t value, const Place& place = {}, uint64_t mask = ~uint64_t{0}) {
+    expected_.push_back({value & mask, mask, place});
+  }
 
   void observe(uint64_t value, uint64_t clock) {
     if (expected_.empty()) {
@@ -43,7 +46,7 @@ class Scoreboard {
     const Expected want = expected_.front();
     expected_.pop_front();
     ++compared_;
-    if (value != want.value)
+    if ((value & want.mask) != want.value)
       note() << "mismatch" << to_string(want.place) << " stage " << stage_ << " clock " << clock << std::hex
              << ": rtl 0x" << value << " model 0x" << want.value << std::dec << '\n';
   }
@@ -72,7 +75,7 @@ class Scoreboard {
 
  private:
   struct Expected {
-    uint64_t value;
+    uint64_t value, mask;
     Place place;
   };
   std::ostream& note() {

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// The configurations under test: Verilated class and formats, for TEMPLATE_TEST_CASE.
+#pragma once
+#include <stdexcept>
+#include <string>
+
+#include "Vpsweep_odd.h"
+#include "Vpsweep_tiny.h"
+#include "rtl/rtl_engine.hpp"
+
+namespace psweep::tb {
+
+inline const rtl::Configuration& configuration(const std::string& name) {
+  for (const auto& c : rtl::configurations())
+    if (c.name == name) return c;
+  throw std::runtime_error("configuration " + name + " was not built");
+}
+
+struct Tiny {
+  using Dut = Vpsweep_tiny;
+  static golden::Config config() { return configuration("tiny").config; }
+};
+struct Odd {
+  using Dut = Vpsweep_odd;
+  static golden::Config config() { return configuration("odd").config; }
+};
+
+}  // namespace psweep::tb
