@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+# The menu. Every target calls a script in scripts/ or the command line it built; nothing is computed here.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+MAKEFLAGS += --no-print-directory
+
+BUILD := build
+export JOBS VERBOSE T SEED SETUP
+
+# Everything that `make config` passes on to scripts/make_config.cmake.
+CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
+               IMG_COLS IMG_ROWS DISPARITY
+
+.PHONY: help
+help: ## This list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
+	@echo '  All of them: JOBS=n (default: all cores), VERBOSE=1, SETUP=no (do not install packages)'
+
+.PHONY: setup
+setup: ## Install the Debian packages that are missing (all other targets do this by themselves)
+	@scripts/setup.sh build
+
+.PHONY: build
+build: setup ## Build everything; the command line is build/psweep
+	@scripts/build.sh
+
+.PHONY: demo
+demo: setup ## Render a scene, depth by float, fixed and RTL, compare, evaluate: build/demo/
+	@scripts/build.sh psweep
+	@scripts/demo.sh
+
+.PHONY: demo-full
+demo-full: setup ## The same at 1120x1120 with 301 planes, every tile through the RTL: build/demo-full/
+	@scripts/build.sh psweep
+	@scripts/demo.sh --full
+
+.PHONY: sim
+sim: build ## The regression, RTL bit-exact with the model   T=<regex of test names> SEED=n
+	@scripts/sim.sh
+
+.PHONY: real
+real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
+	@scripts/build.sh psweep
+	@scripts/real.sh '$(DATA)'
+
+.PHONY: config
+config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=256 ... (scripts/make_config.cmake)
+	@cmake -D DIR=$(BUILD)/configs $(foreach key,$(CONFIG_KEYS),$(if $($(key)),-D $(key)=$($(key)))) \
+	  -P scripts/make_config.cmake
+	@scripts/build.sh psweep
+
+.PHONY: bench
+bench: setup ## Speed of the float reference, the bit-true model and the simulated RTL on this machine
+	@scripts/build.sh psweep
+	@scripts/bench.sh
+
+.PHONY: lint
+lint: ## Check texts, VHDL, C++ layout, converted Verilog, scripts and folders
+	@scripts/setup.sh build lint
+	@scripts/lint.sh
+
+.PHONY: format
+format: ## Lay out the C++ with clang-format
+	@scripts/setup.sh lint
+	@scripts/lint.sh --format
+
+.PHONY: fresh-machine
+fresh-machine: ## README's commands in a bare Debian root   SUITE=bookworm|trixie (root only)
+	@scripts/fresh_machine.sh $(or $(SUITE),bookworm)
+
+.PHONY: clean
+clean: ## Remove build/
+	rm -rf $(BUILD)
