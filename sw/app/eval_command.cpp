@@ -33,13 +33,11 @@ void check_size(const std::string& name, int width, int height, const std::strin
   }
 }
 
-// Next of 1, 2, 5, 10, .. above.
+// Nearest of 1, 2, 5, 10, ..
 double round_scale(double v) {
   const double decade = std::pow(10, std::floor(std::log10(v)));
-  for (const double m : {1.0, 2.0, 5.0}) {
-    if (decade * m >= v * 0.999) return decade * m;
-  }
-  return decade * 10;
+  const double lead = v / decade;
+  return decade * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
 }
 
 bool is_pfm(const fs::path& path) { return read_file(path).compare(0, 2, "Pf") == 0; }

@@ -25,6 +25,11 @@ struct Run {
   fs::path dir;
   RunRecord record;
   std::string engine() const { return record.json.value("engine", "?"); }
+  bool cleaned() const {
+    const ordered_json cleanup = record.json.value("cleanup", ordered_json::object());
+    return cleanup.value("uniqueness", false) || cleanup.value("speckle", false);
+  }
+  std::string name() const { return engine() + (cleaned() ? ", cleaned up" : ""); }
 };
 
 std::string base64(const std::string& bytes) {
@@ -129,7 +134,7 @@ const Row kRunRows[] = {
 template <size_t N>
 std::string table(const Row (&rows)[N], const std::vector<Run>& runs, bool paper) {
   std::string out = "<table><tr><th></th>";
-  for (const auto& run : runs) out += "<th>" + escape(run.engine()) + "</th>";
+  for (const auto& run : runs) out += "<th>" + escape(run.name()) + "</th>";
   if (paper) out += "<th class=\"paper\">paper, rocky</th><th class=\"paper\">paper, flat</th>";
   out += "</tr>\n";
   for (const auto& row : rows) {
@@ -188,8 +193,10 @@ void report_command(const ReportOptions& o) {
 
   const Run *fixed = nullptr, *rtl = nullptr;
   for (const auto& run : runs) {
-    if (run.engine() == "fixed") fixed = &run;
-    if (run.engine() == "rtl") rtl = &run;
+    if (run.engine() == "rtl" && !rtl) rtl = &run;
+  }
+  for (const auto& run : runs) {
+    if (rtl && run.engine() == "fixed" && run.cleaned() == rtl->cleaned() && !fixed) fixed = &run;
   }
   if (fixed && rtl) {
     int compared = 0;
@@ -212,7 +219,7 @@ void report_command(const ReportOptions& o) {
                    "ground truth");
   }
   page << "</div>\n<h2>Depth</h2>\n<div class=\"row\">\n";
-  for (const auto& run : runs) page << figure(read_file(run.dir / "depth.png"), run.engine());
+  for (const auto& run : runs) page << figure(read_file(run.dir / "depth.png"), run.name());
   page << "</div>\n";
   bool errors = false;
   for (const auto& run : runs) errors = errors || fs::exists(run.dir / "error.png");
@@ -221,16 +228,15 @@ void report_command(const ReportOptions& o) {
             "window leaves an image).</p>\n<div "
             "class=\"row\">\n";
     for (const auto& run : runs) {
-      if (fs::exists(run.dir / "error.png")) page << figure(read_file(run.dir / "error.png"), run.engine());
+      if (fs::exists(run.dir / "error.png")) page << figure(read_file(run.dir / "error.png"), run.name());
     }
     page << "</div>\n";
   }
   page << "<h2>Point cloud</h2>\n<div class=\"row\">\n";
-  // Identical clouds are shown once.
-  const Run& shown = rtl ? *rtl : runs.back();
+  const Run& shown = runs.back();  // the others look alike
   const auto cloud = read_ply(shown.dir / "cloud.ply");
   page << figure(encode(cloud_picture(cloud, shown.record.spacing, 1100, 620)),
-                 shown.engine() + ": cloud.ply, " + std::to_string(cloud.size()) +
+                 shown.name() + ": cloud.ply, " + std::to_string(cloud.size()) +
                      " points seen from above and the left, tinted by depth");
   page << "</div>\n";
   bool metric = false;

@@ -32,7 +32,7 @@ struct Tick {
   std::string label;
 };
 
-// Round numbers inside lo .. hi, about `count` of them.
+// Round numbers inside lo .. hi, about `count` of them. (+ 0.0 turns -0 into 0.)
 std::vector<double> round_numbers(double lo, double hi, int count) {
   const double raw = (hi - lo) / count;
   const double decade = std::pow(10, std::floor(std::log10(raw)));
@@ -41,7 +41,7 @@ std::vector<double> round_numbers(double lo, double hi, int count) {
     if (decade * m >= raw * 0.999) step = decade * m;
   }
   std::vector<double> out;
-  for (double k = std::ceil(lo / step - 1e-9); k * step <= hi * (1 + 1e-9); k += 1) out.push_back(k * step);
+  for (double k = std::ceil(lo / step - 1e-9) + 0.0; k * step <= hi * (1 + 1e-9); k += 1) out.push_back(k * step);
   return out;
 }
 
@@ -136,7 +136,7 @@ cv::Mat cloud_picture(const std::vector<CloudPoint>& points, const PlaneSpacing&
     };
     const double mx = middle(&CloudPoint::x), my = middle(&CloudPoint::y), mz = middle(&CloudPoint::z);
     // The eye moves up and to the left on a circle around the middle: rotate by yaw, then pitch.
-    const double yaw = 0.45, pitch = 0.30, distance = 1.15 * mz;
+    const double yaw = 0.40, pitch = 0.12, distance = 1.15 * mz;
     std::vector<cv::Vec3d> turned;
     for (const auto& p : points) {
       const double x = p.x - mx, y = p.y - my, z = p.z - mz;
@@ -144,15 +144,23 @@ cv::Mat cloud_picture(const std::vector<CloudPoint>& points, const PlaneSpacing&
       const double y2 = std::cos(pitch) * y - std::sin(pitch) * z1, z2 = std::sin(pitch) * y + std::cos(pitch) * z1;
       turned.emplace_back(x1, y2, z2 + distance);
     }
-    // Field of view: 98 % of the points fit.
-    std::vector<double> reach;
+    // Frame: the middle 98 % of the points, across and down, fill it but for a margin.
+    std::vector<double> across, down;
     for (const auto& p : turned) {
-      if (p[2] > 1e-6) reach.push_back(std::max(std::abs(p[0]) / p[2] * h / w, std::abs(p[1]) / p[2]));
+      if (p[2] <= 1e-6) continue;
+      across.push_back(p[0] / p[2]);
+      down.push_back(p[1] / p[2]);
     }
-    if (!reach.empty()) {
-      const size_t at = std::min(reach.size() - 1, reach.size() * 98 / 100);
-      std::nth_element(reach.begin(), reach.begin() + static_cast<std::ptrdiff_t>(at), reach.end());
-      const double focal = h / 2.0 / std::max(1e-9, reach[at]);
+    if (!across.empty()) {
+      const auto quantile = [](std::vector<double>& v, double share) {
+        const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(v.size() - 1));
+        std::nth_element(v.begin(), v.begin() + at, v.end());
+        return v[static_cast<size_t>(at)];
+      };
+      const double left = quantile(across, 0.01), right = quantile(across, 0.99);
+      const double top = quantile(down, 0.01), bottom = quantile(down, 0.99);
+      const double focal = 0.92 * std::min(w / std::max(1e-9, right - left), h / std::max(1e-9, bottom - top));
+      const double shift_x = w / 2.0 - focal * (left + right) / 2, shift_y = h / 2.0 - focal * (top + bottom) / 2;
       const int dot = std::max(1, static_cast<int>(std::lround(1.2 * std::sqrt(static_cast<double>(w) * h /
                                                                                static_cast<double>(points.size())))));
       std::vector<float> depth(static_cast<size_t>(w) * h, std::numeric_limits<float>::infinity());
@@ -164,10 +172,10 @@ cv::Mat cloud_picture(const std::vector<CloudPoint>& points, const PlaneSpacing&
         const cv::Vec3b tint = colour(table, share);
         cv::Vec3b shade;
         for (int c = 0; c < 3; ++c) {
-          shade[c] = static_cast<uint8_t>(std::min(255.0, points[i].grey * (0.55 + 0.75 * tint[c] / 255.0)));
+          shade[c] = static_cast<uint8_t>(std::min(255.0, points[i].grey * (0.7 + 0.9 * tint[c] / 255.0)));
         }
-        const int cx = static_cast<int>(std::lround(w / 2.0 + focal * p[0] / p[2])) - dot / 2;
-        const int cy = static_cast<int>(std::lround(h / 2.0 + focal * p[1] / p[2])) - dot / 2;
+        const int cx = static_cast<int>(std::lround(shift_x + focal * p[0] / p[2])) - dot / 2;
+        const int cy = static_cast<int>(std::lround(shift_y + focal * p[1] / p[2])) - dot / 2;
         for (int y = std::max(0, cy); y < std::min(h, cy + dot); ++y) {
           for (int x = std::max(0, cx); x < std::min(w, cx + dot); ++x) {
             float& z = depth[static_cast<size_t>(y) * w + x];
