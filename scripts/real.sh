@@ -74,8 +74,8 @@ pair() {
       "$here/scripts/same_output.sh" "$out/$name/fixed" "$dir" || { same=NO; wrong="$wrong $name"; }
     fi
     planes=$(sed -n 's/^  "planes": \([0-9]*\).*/\1/p' "$dir/report.json")
-    clocks=$(awk '/"clocks_in_all"/ { gsub(/[^0-9]/, "", $2); printf "%.1f", $2 / 1e6; f = 1 } END { if (!f) printf "-" }' \
-      "$dir/report.json")
+    clocks=$(awk '/"clocks_in_all"/ { gsub(/[^0-9]/, "", $2); printf "%.1f", $2 / 1e6; f = 1 }
+                  END { if (!f) printf "-" }' "$dir/report.json")
     results=$out/$name/$engine.txt
     echo "| $name | $engine | $range | $planes | $(number matched_percent "$results") |" \
       "$(number bad1_percent "$results") | $(number bad1_all_percent "$results") |" \
@@ -93,9 +93,11 @@ cat > "$table.new" <<END
 
 Window 13, threshold 0.85, no clean-up. Evaluated: pixels of the left image with truth, outside occlusions where the
 data set has that mask (rocks1 has none, so its occluded pixels count; its truth can sit 0.5 px low, which shows in the
-mean error). Matched: share of these with a disparity. Bad: more than 1 px off. navcam has no truth.
+mean error). Matched: share of these with a disparity. Bad: share of the matched
+that is more than 1 px off; bad all: of the evaluated, unmatched ones counted. Mean px: error of the good ones.
+= fixed: every file but report.json has the bytes of the bit-true model's. navcam has no truth.
 
-| pair | engine | disparities | planes | matched % | bad of matched % | bad or unmatched % | mean error of good, px | M clocks | same bytes as fixed |
+| pair | engine | disparities | planes | matched % | bad % | bad all % | mean px | M clocks | = fixed |
 |---|---|---|---|---|---|---|---|---|---|
 END
 pair tsukuba im3.png im4.png 3:16 groundtruth.png 16 nonocc.png
