@@ -2,6 +2,7 @@
 // Catch2 2 (Debian 12, one header) and Catch2 3 (Debian 13, library) under one name; tests include this file only.
 // PSWEEP_CATCH2_V3 comes from scripts/cmake/PsweepTargets.cmake.
 //   psweep::contains("text")  matcher: the string contains "text"
+//   psweep::approx(value)     floating-point comparison with .epsilon() and .margin()
 //   psweep::test_seed()       seed of all random stimuli: environment PSWEEP_SEED, else 1. Put it into INFO().
 #pragma once
 #ifdef PSWEEP_CATCH2_V3
@@ -31,6 +32,12 @@ inline auto contains(const std::string& text) {
   return Catch::Matchers::Contains(text);
 #endif
 }
+
+#ifdef PSWEEP_CATCH2_V3
+inline Catch::Approx approx(double value) { return Catch::Approx(value); }
+#else
+inline Catch::Detail::Approx approx(double value) { return Catch::Detail::Approx(value); }
+#endif
 
 // Not Catch's own seed: version 3 draws a fresh one for every run, and a regression must be repeatable.
 inline uint32_t test_seed() {
