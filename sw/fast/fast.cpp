@@ -65,12 +65,13 @@ class Aligned {
   std::unique_ptr<T, FreeAligned<T>> data_;
 };
 
-// Widest numbers that the sums of a format need, samples centred on zero. With n = M*M and samples within +-h: vertical
-// sums M h, window sums of squares 2 n h^2, their products n * 2 n h^2.
+// Widest numbers that the sums of a format need. Samples are centred, within +-h; n = M*M. Window sums of squares reach
+// n 2h^2, their products n * n 2h^2. Where the former fit 31 bits, vertical sums M h fit the 16 bits of the strided
+// sweep: (M h)^2 <= 2^30.
 fast::SumWidth sum_width(const Config& c) {
-  const double half = std::ldexp(1.0, c.sample_bits() - 1), m = c.window, squares = m * m * 2 * half * half;
-  if (m * half <= 32767 && squares <= 2147483647.0) return fast::SumWidth::k32;
-  return m * m * squares <= std::ldexp(1.0, 52) ? fast::SumWidth::k53 : fast::SumWidth::k64;
+  const double half = std::ldexp(1.0, c.sample_bits() - 1), n = c.window * c.window, squares = n * 2 * half * half;
+  if (squares <= 2147483647.0) return fast::SumWidth::k32;
+  return n * squares <= std::ldexp(1.0, 52) ? fast::SumWidth::k53 : fast::SumWidth::k64;
 }
 
 const SweepLevel& sweep_level(SimdLevel level, fast::SumWidth sums) {

@@ -8,6 +8,7 @@
 
 #include "core/error.hpp"
 #include "golden/address_generator.hpp"
+#include "golden/control.hpp"
 
 namespace psweep {
 namespace {
@@ -412,10 +413,7 @@ golden::Pixels cut_window(const Gray& image, int x, int y, int cols, int rows) {
 }
 
 uint64_t tile_clocks(const golden::Config& format, const golden::TileJob& job) {
-  const auto cols = static_cast<uint64_t>(std::max(sweep_cols(format, job), golden::kRowMin));
-  const auto rows = static_cast<uint64_t>(sweep_rows(format, job));
-  return static_cast<uint64_t>(job.planes) * cols * rows + static_cast<uint64_t>(job.win_cols) * job.win_rows +
-         static_cast<uint64_t>(job.tile_cols) * job.tile_rows;
+  return golden::load_clocks(job) + golden::sweep_clocks(format, job) + golden::unload_clocks(job);
 }
 
 uint64_t plan_clocks(const golden::Config& format, const Plan& plan) {

@@ -19,7 +19,9 @@ struct Pair {
 };
 
 // Content 0: correlated noise; 1: noise with flat patches; 2: black and white; 3: constant; 4: a smooth slope, whose
-// best plane moves slowly (many improvements in a row); 5: faint texture.
+// best plane moves slowly (many improvements in a row); 5: faint texture; 6: black left, white right, a few specks (the
+// largest sums).
+// (largest sums).
 Pair make_pair_of_images(int width, int height, int bits, int content, unsigned seed) {
   std::mt19937 random(seed);
   const int most = (1 << std::min(bits, 8)) - 1;
@@ -32,13 +34,16 @@ Pair make_pair_of_images(int width, int height, int bits, int content, unsigned 
       if (content == 3) v = most / 3;
       if (content == 4) v = static_cast<int>((std::sin(x * 0.21) + std::cos(y * 0.33 + x * 0.05) + 2) * most / 4);
       if (content == 5) v = most / 2 + (v & 1);
+      if (content == 6) v = random() % 200 == 0 ? most : 0;
       p.left.at(x, y) = static_cast<uint8_t>(v);
     }
   }
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const int v = p.left.at(std::min(x + width / 9, width - 1), y);
-      p.right.at(x, y) = static_cast<uint8_t>(content == 0 ? (v * 7 + noise()) / 8 : content == 2 ? most - v : v);
+      p.right.at(x, y) = static_cast<uint8_t>(content == 0                   ? (v * 7 + noise()) / 8
+                                              : content == 2 || content == 6 ? most - v
+                                                                             : v);
       if (content == 1 && x > width / 2 && y > height / 3)
         p.left.at(x, y) = p.right.at(x, y) = static_cast<uint8_t>(most / 2);
     }
@@ -116,7 +121,7 @@ TEST_CASE("fast map equals the plain model: formats") {
       Format{7, 4, 12, 5, 12, 12}, Format{7, 6, 3, 5, 9, 6}, Format{9, 8, 1, 8, 13, 8}, Format{5, 12, 12, 8, 16, 12},
       Format{21, 12, 12, 8, 16, 12}, Format{11, 8, 2, 3, 11, 7}, Format{5, 8, 8, 2, 15, 11}, Format{5, 10, 6, 2, 13, 8},
       Format{13, 8, 4, 4, 13, 8});
-  const int content = GENERATE(0, 1, 2, 4);
+  const int content = GENERATE(0, 1, 2, 4, 6);
   SweepSetup s = make_setup(format.window * 2 + 25, format.window + 19, 13);
   s.format.window = format.window;
   s.format.pix_bits = format.pix;
@@ -291,6 +296,32 @@ TEST_CASE("a tile alone: any window, bounds, table and starts") {
   }
   CHECK(window_errors > 0);
   CHECK(winners > 1000);
+}
+
+TEST_CASE("faint texture on black in the widest format: sums of 57 bits, variances of 32") {
+  std::mt19937 random(31);
+  auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  golden::Config c;
+  c.window = 21, c.pix_bits = 12, c.weight_bits = 12, c.interp_frac = 8, c.mncc_bits = 16, c.frac_bits = 12;
+  golden::TileJob job;
+  job.tile_cols = 60, job.tile_rows = 40, job.win_cols = 90, job.win_rows = 70, job.planes = 12;
+  job.left = job.right = {0, 88, 0, 68};
+  std::vector<golden::PlaneEntry> table;
+  for (int k = 0; k < job.planes; ++k) {
+    auto start = [&] { return below(1 << 20); };
+    table.push_back({start(), start(), start(), start(), 1 << 19, 1 << 19, (1 << 19) + 77, 1 << 19});
+  }
+  golden::Pixels left(job.win_cols, job.win_rows), right(job.win_cols, job.win_rows);
+  for (auto& v : left.data) v = static_cast<uint16_t>(below(3));
+  right.data = left.data;
+  for (auto& v : right.data) v = static_cast<uint16_t>(below(4) ? v : below(3));
+  const auto expected = golden::run_tile(c, job, table, left, right);
+  for (const SimdLevel level : simd_levels()) {
+    CAPTURE(simd_name(level));
+    FastOptions options;
+    options.level = level;
+    CHECK(run_tile_fast(c, job, table, left, right, options).cells == expected.cells);
+  }
 }
 
 TEST_CASE("wrong images and instruction sets are named") {
