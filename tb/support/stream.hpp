@@ -97,15 +97,18 @@ class StreamMonitor : public Agent {
   void set_stall(double probability) { stall_ = std::bernoulli_distribution(probability); }
   uint64_t beats() const { return beats_; }
   uint64_t protocol_errors() const { return protocol_errors_; }
-  // After a reset or an abort: the offered beat may vanish without an error.
-  void forgive() { held_ = false; }
+  // Off around a reset or an abort, when an offered beat may vanish.
+  void set_watching(bool on) {
+    watching_ = on;
+    held_ = false;
+  }
 
   void drive() override { *ports_.ready = !stall_(random_); }
   void sample() override {
     const bool valid = *ports_.valid != 0, ready = *ports_.ready != 0;
     const Beat beat{static_cast<uint64_t>(*ports_.data), ports_.last && *ports_.last, sim_.cycle()};
     if (held_ && (!valid || beat.data != waiting_.data || beat.last != waiting_.last)) ++protocol_errors_;
-    held_ = valid && !ready;
+    held_ = watching_ && valid && !ready;
     waiting_ = beat;
     if (valid && ready) {
       ++beats_;
@@ -119,7 +122,7 @@ class StreamMonitor : public Agent {
   std::mt19937 random_;
   std::bernoulli_distribution stall_;
   std::function<void(const Beat&)> sink_;
-  bool held_ = false;
+  bool held_ = false, watching_ = true;
   Beat waiting_;
   uint64_t beats_ = 0, protocol_errors_ = 0;
 };
