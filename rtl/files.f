@@ -6,3 +6,8 @@ control.vhd
 address_generator.vhd
 storage.vhd
 interpolation.vhd
+delay_line.vhd
+divider.vhd
+similarity.vhd
+updating.vhd
+psweep.vhd

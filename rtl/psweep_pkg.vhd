@@ -40,6 +40,10 @@ package psweep_pkg is
   constant C_STORAGE_LATENCY       : positive := 4; -- position to 2x2 pixels
   constant C_INTERPOLATION_LATENCY : positive := 6; -- 2x2 pixels to sample
 
+  -- Last sample of a window to its cell; cell to its write into the map.
+  function similarity_latency (mncc_w : positive) return positive;
+  function updating_latency (frac_w : positive) return positive;
+
   -- Bits that hold 0 .. n-1, at least 1.
   function clog2 (n : positive) return positive;
 
@@ -48,6 +52,16 @@ package psweep_pkg is
 end package psweep_pkg;
 
 package body psweep_pkg is
+
+  function similarity_latency (mncc_w : positive) return positive is
+  begin
+    return 16 + mncc_w;
+  end function similarity_latency;
+
+  function updating_latency (frac_w : positive) return positive is
+  begin
+    return 4 + frac_w;
+  end function updating_latency;
 
   function clog2 (n : positive) return positive is
     variable v_bits : positive := 1;
