@@ -131,9 +131,6 @@ void depth_command(const DepthOptions& o) {
     left = std::move(pair.left);
     right = std::move(pair.right);
     calibration.rig = pair.rig;
-    write_png(out.file("rectified_left.png"), left);
-    write_png(out.file("rectified_right.png"), right);
-    write_calibration(out.file("rectified_calib.yaml"), calibration.rig);
   }
 
   SweepSetup setup;
@@ -166,6 +163,11 @@ void depth_command(const DepthOptions& o) {
 
   const double fb = setup.rig.cyclopean().fx * setup.rig.baseline;
   const FloatImage disparity = left_disparity(setup.rig, result.depth);
+  if (calibration.raw) {
+    write_png(out.file("rectified_left.png"), left);
+    write_png(out.file("rectified_right.png"), right);
+    write_calibration(out.file("rectified_calib.yaml"), calibration.rig);
+  }
   write_pfm(out.file("depth.pfm"), result.depth);
   write_pfm(out.file("mncc.pfm"), result.mncc);
   write_pfm(out.file("disparity.pfm"), disparity);

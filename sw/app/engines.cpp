@@ -19,6 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr TileSize kUsualTile{256, 130};
+
 double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 TileSize parse_tile(const std::string& text) {
@@ -47,7 +49,7 @@ void describe_tiles(const Plan& plan, EngineRun& run) {
 
 EngineRun run_fixed_engine(const Gray& left, const Gray& right, SweepSetup setup, const std::string& tile, int threads,
                            const ProgressCall& progress) {
-  fit_format(setup, tile.empty() ? TileSize{256, 130} : parse_tile(tile));
+  fit_format(setup, tile.empty() ? kUsualTile : parse_tile(tile));
   const Plan plan = plan_tiles(setup, setup.format.plane_cols, setup.format.plane_rows);
   EngineRun run;
   describe_tiles(plan, run);
@@ -98,7 +100,7 @@ const rtl::Configuration* choose(SweepSetup& setup, const std::string& tile, con
     }
   }
   if (best) return best;
-  fit_format(setup, tile.empty() ? TileSize{64, 64} : parse_tile(tile));
+  fit_format(setup, tile.empty() ? kUsualTile : parse_tile(tile));
   std::string built;
   for (const auto& c : rtl::configurations()) built += (built.empty() ? "" : ", ") + c.name;
   throw InputError("--engine rtl: " +

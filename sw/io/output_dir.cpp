@@ -21,24 +21,38 @@ OutputDir::OutputDir(fs::path target) : target_(std::move(target)) {
   }
   partial_ = target_;
   partial_ += ".partial-" + std::to_string(getpid());
+  make_partial();  // finds out whether it can be
+  fs::remove(partial_, error);
+  made_ = false;
+}
+
+void OutputDir::make_partial() {
+  std::error_code error;
   fs::remove_all(partial_, error);
   if (!target_.parent_path().empty()) fs::create_directories(target_.parent_path(), error);
   if (!fs::create_directory(partial_, error)) {
     throw InputError(target_.string() + ": cannot create the output directory: " + error.message());
   }
+  made_ = true;
+}
+
+fs::path OutputDir::file(const std::string& name) {
+  if (!made_) make_partial();
+  return partial_ / name;
 }
 
 OutputDir::~OutputDir() {
   std::error_code ignored;
-  if (!partial_.empty()) fs::remove_all(partial_, ignored);
+  if (made_) fs::remove_all(partial_, ignored);
 }
 
 void OutputDir::commit(const std::vector<std::string>& stale) {
+  if (!made_) make_partial();  // a run without files
   std::error_code error;
   if (!fs::exists(target_)) {
     fs::rename(partial_, target_, error);
     if (error) throw InputError(target_.string() + ": cannot rename the finished output: " + error.message());
-    partial_.clear();
+    made_ = false;
     return;
   }
   for (const auto& name : stale) {
