@@ -2,11 +2,11 @@
 -- psweep: the plane-sweep stereo engine (paper, section 4.2, figure 4): a tile of pixels in, a tile of depth cells out.
 --   Streams   : s_cfg registers and plane table, s_pix the window of both images, m_map the cells (docs/interfaces.md)
 --   Rate      : one plane cell per clock through the whole sweep, no bubble between rows or planes
---   Clocks    : from the start command to the last map beat, without stalls outside,
---                 win_cols * win_rows
+--   Clocks    : from the start command to the last map beat (port tile_clocks), without stalls outside,
+--                 win_cols * win_rows + tile_cols * tile_rows
 --               + planes * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
---               + tile_cols * tile_rows + a constant of the configuration        (sw/golden/control.hpp, checked by the
---               bench; port tile_clocks counts them)
+--               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 43 + G_MNCC_W + G_FRAC_W
+--               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
 --   Numbers   : docs/numeric_contract.md
 --   Lanes     : address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the
 --               low bits. G_LANES = 1 in this version

@@ -43,12 +43,26 @@ constexpr int kAddressLatency = 9;
 constexpr int kStorageLatency = 4;
 constexpr int kInterpolationLatency = 6;
 
-// Clocks of a whole tile, start command to last map beat (port tile_clocks), if neither stream stalls: every pixel,
-// sample and cell takes one clock, one thing after the other, and the rest is the filling of pipelines.
+inline int similarity_latency(const Config& c) { return 16 + c.mncc_bits; }
+inline int updating_latency(const Config& c) { return 4 + c.frac_bits; }
+// The start command, the last plane noticed in the map, the unload command and the first word out of the map.
+constexpr int kControlClocks = 4;
+
+// Clocks of a whole tile if neither stream stalls: every pixel, sample and cell takes one clock, one thing after the
+// other, and the pipeline is filled once. engine_clocks() is what port tile_clocks shows: from the start command to the
+// last map beat. The padding of the last row does not count, since nobody waits for it.
 inline uint64_t load_clocks(const TileJob& t) { return static_cast<uint64_t>(t.win_cols) * t.win_rows; }
 inline uint64_t sweep_clocks(const Config& c, const TileJob& t) {
-  return static_cast<uint64_t>(t.planes) * sweep_rows(c, t) * std::max(sweep_cols(c, t), kRowMin);
+  const int row = std::max(sweep_cols(c, t), kRowMin);
+  return static_cast<uint64_t>(t.planes) * sweep_rows(c, t) * row - (row - sweep_cols(c, t));
 }
 inline uint64_t unload_clocks(const TileJob& t) { return static_cast<uint64_t>(t.tile_cols) * t.tile_rows; }
+inline uint64_t fill_clocks(const Config& c) {
+  return static_cast<uint64_t>(kAddressLatency + kStorageLatency + kInterpolationLatency + similarity_latency(c) +
+                               updating_latency(c) + kControlClocks);
+}
+inline uint64_t engine_clocks(const Config& c, const TileJob& t) {
+  return load_clocks(t) + sweep_clocks(c, t) + unload_clocks(t) + fill_clocks(c);
+}
 
 }  // namespace psweep::golden
