@@ -456,7 +456,7 @@ begin
       clk                => clk,
       rst                => rst,
       start              => map_start,
-      abort              => map_abort,
+      cancel             => map_abort,
       s_valid            => cell_valid(0),
       s_last             => cell_last(0),
       s_inside           => cell_inside(0),

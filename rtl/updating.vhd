@@ -11,7 +11,7 @@
 --             more clocks than the loop (control: at least 3 C_ROW_MIN)
 --   Mask    : bit 0 outside, 1 no variance, 2 below threshold, 3 not a local maximum; while a cell has no winner, the
 --             low bits of its fraction remember whether it was ever inside (0) and textured (1)
---   Reset   : and abort: valids, counters; the map keeps its contents
+--   Reset   : and cancel: valids, counters; the map keeps its contents
 --   Golden  : sw/golden/updating.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -30,7 +30,7 @@ entity updating is
     rst : in  std_logic;
 
     start  : in  std_logic; -- pulse: the next cell is the first of a new tile
-    abort  : in  std_logic; -- pulse: forget what is on its way
+    cancel : in  std_logic; -- pulse: forget what is on its way
 
     s_valid    : in  std_logic;
     s_last     : in  std_logic; -- last cell of the plane
@@ -171,7 +171,7 @@ begin
     report "updating: G_FRAC_W=" & integer'image(G_FRAC_W) & " outside 2..12"
     severity failure;
 
-  clear <= rst or abort or start;
+  clear <= rst or cancel or start;
 
   -- Map --------------------------------------------------------------------------------------------------------------
   raddr <= std_logic_vector(held_cell) when fetched = '1' and out_ready = '0' else std_logic_vector(read_cell);
@@ -310,7 +310,7 @@ begin
                      & v_local_max & v_prev_valid;
       s3_rise     <= s2_best - s2_prev;
       s3_both     <= (s2_best & '0') - resize(s2_prev, G_MNCC_W + 1) - resize(s2_v, G_MNCC_W + 1);
-      if rst = '1' or abort = '1' then
+      if rst = '1' or cancel = '1' then
         s1_valid <= '0';
         s2_valid <= '0';
         s3_valid <= '0';
@@ -397,7 +397,7 @@ begin
       elsif out_ready = '1' then
         fetched <= '0';
       end if;
-      if rst = '1' or abort = '1' then
+      if rst = '1' or cancel = '1' then
         unloading <= '0';
         fetched   <= '0';
       end if;
