@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Compile order, relative to this folder.
 psweep_pkg.vhd
 ram_sdp.vhd

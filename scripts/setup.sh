@@ -67,7 +67,7 @@ find_missing
 
 by_hand="As root: apt-get install --no-install-recommends ${missing[*]}"
 command -v apt-get > /dev/null ||
-  die "missing: ${missing[*]}" "This is no Debian (there is no apt-get): install their like, then run make with SETUP=no."
+  die "missing: ${missing[*]}" "This is no Debian (there is no apt-get): install their like, run make with SETUP=no."
 as_root=(env DEBIAN_FRONTEND=noninteractive)
 if [ "$(id -u)" -ne 0 ]; then
   command -v sudo > /dev/null || die "missing: ${missing[*]}" "Neither root nor sudo to install them. $by_hand"
@@ -87,11 +87,13 @@ give_up() {
 # apt-get update ends with 0 even when it reaches nobody; what counts is whether the packages are known afterwards.
 SECONDS=0
 "${apt[@]}" update > "$log" 2>&1 || say "the package lists could not be renewed, trying with the old ones"
+known=$(apt-cache policy "${missing[@]}" 2> /dev/null | awk '/^[^ ]/ { sub(/:$/, ""); name = $0 }
+  /^  Candidate: [^(]/ { print name }')
 unknown=()
 for package in "${missing[@]}"; do
-  if ! apt-cache policy "$package" 2> /dev/null | grep -q '^  Candidate: [^(]'; then unknown+=("$package"); fi
+  if ! grep -qxF "$package" <<< "$known"; then unknown+=("$package"); fi
 done
-[ ${#unknown[@]} -eq 0 ] || give_up "apt knows no package of this name (no network, or not Debian 12 or 13): ${unknown[*]}"
+[ ${#unknown[@]} -eq 0 ] || give_up "apt does not know (no network, or not Debian 12 or 13): ${unknown[*]}"
 
 # In two steps, to tell the network's time from the machine's.
 "${apt[@]}" install -y --no-install-recommends --download-only "${missing[@]}" > "$log" 2>&1 ||

@@ -5,8 +5,8 @@
 #
 #   scripts/summary.sh RESULTS.xml      (from ctest --output-junit)
 #
-# Skipped is a test that asked for it, by a line 'SKIPPED: <reason>' (property SKIP_REGULAR_EXPRESSION), by its exit code
-# (SKIP_RETURN_CODE), or that is disabled. A test that could not be started failed, and so did a test with a failed
+# Skipped is a test that asked for it by a line 'SKIPPED: <reason>' (property SKIP_REGULAR_EXPRESSION) or by its exit
+# code (SKIP_RETURN_CODE), or that is disabled. A test that could not be started failed, and so did a test with a failed
 # assertion, whatever else it printed. Exit code 1 if a test failed, if none passed, or if there are no results.
 set -euo pipefail
 case "${1:-}" in
@@ -31,7 +31,9 @@ function plain(text) {
 /<testcase / { name = attribute($0, "name"); status = attribute($0, "status"); reason = ""; asked = 0; broken = 0 }
 /<skipped /  { reason = attribute($0, "message"); if (reason ~ /^SKIP_/) asked = 1 }
 # The output of a test may begin on the line of its tag; angle brackets in it are escaped.
-/SKIPPED: /  { if (status != "run") { reason = plain($0); sub(/.*SKIPPED: /, "", reason); sub(/<\/system-out>.*/, "", reason) } }
+/SKIPPED: /  {
+  if (status == "notrun") { reason = plain($0); sub(/.*SKIPPED: /, "", reason); sub(/<\/system-out>.*/, "", reason) }
+}
 /FAILED:/    { broken = 1 }
 /<\/testcase>/ {
   if (status == "run") passed++

@@ -22,10 +22,8 @@ execute_process(
 
 set(PSWEEP_VHDL_STANDARD --std=93c)
 set(PSWEEP_RTL_MODEL_DIR ${CMAKE_CURRENT_LIST_DIR})
-# -Wall and every warning is an error. DECLFILENAME: the file is called after the top entity only. COMBDLY: GHDL writes
-# dynamic reads as 'always @* x <= ..', which is harmless. CASEINCOMPLETE stays fatal: it is the only alarm for the
-# 'others' branches that GHDL 2.0 loses.
-set(PSWEEP_VERILATOR_FLAGS -Wall -Wno-DECLFILENAME -Wno-COMBDLY -O3 --x-initial unique --x-assign unique)
+# -Wall and every warning is an error, but for the waivers of ghdl_netlist.vlt.
+set(PSWEEP_VERILATOR_FLAGS -Wall -O3 --x-initial unique --x-assign unique)
 
 # The run-time library comes with Verilator as source.
 add_library(verilated_rt STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated.cpp

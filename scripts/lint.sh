@@ -1,0 +1,139 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Quick checks of everything that is text; no network, nothing is built. Ends with 'N passed, N failed, N skipped'.
+#
+#   scripts/lint.sh [CHECK ...]      default: all of the checks below
+#   scripts/lint.sh --format         lay out the C++ with clang-format instead
+#
+#   layout     what lies at the top level; a README in each folder
+#   text       ASCII, LF, no tabs, no trailing blanks, 120 columns, SPDX line (lint_text.pl)
+#   links      relative links in Markdown lead somewhere
+#   files      rtl/files.f lists every VHDL file once
+#   analyse    GHDL takes all files of rtl/files.f as VHDL-93, warnings are errors
+#   vhdl       no construct that the conversion to Verilog breaks (lint_text.pl)
+#   units      every entity has a golden model, a test and a page
+#   verilog    Verilator -Wall on the converted engine in every named configuration (scripts/cmake/ghdl_netlist.vlt)
+#   format     clang-format leaves the C++ as it is
+#   shell      shellcheck on the scripts
+#
+# Exceptions: scripts/lint_waivers.txt, each with its reason. A check without its tool is skipped by name.
+set -uo pipefail
+cd "$(dirname "$0")/.." || exit 1
+export LC_ALL=C
+
+# Tracked files and new ones that git does not ignore, deleted ones left out. Without git: all but builds.
+list_files() {
+  if git -c safe.directory='*' rev-parse --git-dir > /dev/null 2>&1; then
+    git -c safe.directory='*' ls-files -co --exclude-standard
+  else
+    find . -type f -not -path './build*' -not -path './.git/*' | sed 's|^\./||'
+  fi | sort -u | while read -r file; do if [ -f "$file" ]; then echo "$file"; fi; done
+}
+mapfile -t all_files < <(list_files)
+select_files() { printf '%s\n' "${all_files[@]}" | grep -E "$1" || true; }
+mapfile -t vhdl_files < <(select_files '^rtl/.*\.vhd$')
+mapfile -t cpp_files < <(select_files '\.(cpp|hpp|inc)$')
+mapfile -t listed_files < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d; s|^|rtl/|' rtl/files.f)
+
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+skip() { reason=$1; return 77; }
+
+check_layout() {
+  local extra bad=0 folder
+  extra=$(printf '%s\n' "${all_files[@]}" | cut -d/ -f1 | sort -u |
+    grep -vxE 'rtl|tb|sw|constraints|scripts|docs|CMakeLists\.txt|CMakePresets\.json|Makefile|README\.md|LICENSE|\..*')
+  if [ -n "$extra" ]; then echo "at the top level, beyond the agreed layout:" "$extra"; bad=1; fi
+  for folder in . rtl tb sw constraints scripts docs; do
+    if [ ! -f "$folder/README.md" ]; then echo "$folder/README.md is missing"; bad=1; fi
+  done
+  return $bad
+}
+check_text() { scripts/lint_text.pl text "${all_files[@]}"; }
+check_links() {
+  local pages
+  mapfile -t pages < <(select_files '\.md$')
+  scripts/lint_text.pl links "${pages[@]}"
+}
+check_files() {
+  local difference
+  difference=$(diff <(printf '%s\n' "${listed_files[@]}" | sort) <(printf '%s\n' "${vhdl_files[@]}" | sort))
+  [ -z "$difference" ] || { printf 'rtl/files.f (<) is not rtl/*.vhd (>):\n%s\n' "$difference"; return 1; }
+}
+check_analyse() {
+  command -v ghdl > /dev/null || skip "ghdl is not installed" || return
+  mkdir "$scratch/work"
+  ghdl -a --std=93c --warn-error --workdir="$scratch/work" "${listed_files[@]}"
+}
+check_vhdl() { scripts/lint_text.pl vhdl "${vhdl_files[@]}"; }
+check_units() { scripts/lint_text.pl units "${vhdl_files[@]}"; }
+
+# Keys of a configuration and the generics they become, as in tb/rtl/CMakeLists.txt.
+generics_of() {
+  local pair
+  for pair in img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES \
+    window:WINDOW pix_bits:PIX_W weight_bits:WEIGHT_W interp_frac:INTERP_F mncc_bits:MNCC_W frac_bits:FRAC_W \
+    lanes:LANES; do
+    sed -nE "s/.*\"${pair%:*}\": *([0-9]+).*/-gG_${pair#*:}=\1/p" "$1"
+  done
+}
+check_verilog() {
+  command -v ghdl > /dev/null || skip "ghdl is not installed" || return
+  command -v verilator > /dev/null || skip "verilator is not installed" || return
+  local config name dir bad=0 generics
+  for config in tb/configs/*.json; do
+    name=$(basename "$config" .json)
+    dir=$scratch/$name
+    mapfile -t generics < <(generics_of "$config")
+    if [ ${#generics[@]} -ne 12 ]; then echo "$config: found ${#generics[@]} of 12 generics"; bad=1; continue; fi
+    if cmake -D GHDL=ghdl -D STANDARD=--std=93c -D TOP=psweep -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
+      -D "GENERICS=$(IFS='|'; echo "${generics[*]}")" -D "DIR=$dir" -P scripts/cmake/VhdlToVerilog.cmake &&
+      verilator --lint-only -Wall --top-module psweep scripts/cmake/ghdl_netlist.vlt "$dir/psweep.v"; then
+      continue
+    fi
+    echo "configuration $name: see above"
+    bad=1
+  done
+  return $bad
+}
+check_format() {
+  command -v clang-format > /dev/null || skip "clang-format is not installed" || return
+  local file bad=0
+  for file in "${cpp_files[@]}"; do
+    if ! clang-format --dry-run --Werror "$file" > /dev/null 2>&1; then
+      echo "$file: not laid out by .clang-format; 'make format' does it"
+      bad=1
+    fi
+  done
+  return $bad
+}
+check_shell() {
+  command -v shellcheck > /dev/null || skip "shellcheck is not installed" || return
+  local scripts
+  mapfile -t scripts < <(grep -lE '^#!.*\b(ba)?sh$' "${all_files[@]}")
+  shellcheck "${scripts[@]}"
+}
+
+checks=(layout text links files analyse vhdl units verilog format shell)
+case "${1:-}" in
+  -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
+  --format) exec clang-format -i "${cpp_files[@]}" ;;
+  '') ;;
+  *) checks=("$@") ;;
+esac
+
+passed=0 failed=0 skipped=0
+for check in "${checks[@]}"; do
+  if ! declare -F "check_$check" > /dev/null; then echo "lint: no check '$check'; see --help" >&2; exit 2; fi
+  reason=
+  # Not in a subshell: skip() leaves its reason.
+  "check_$check" > "$scratch/output" 2>&1
+  case $? in
+    0) passed=$((passed + 1)) ;;
+    77) skipped=$((skipped + 1)); echo "lint: $check: SKIPPED: $reason" ;;
+    *) failed=$((failed + 1)); cat "$scratch/output"; echo "lint: $check: FAILED" ;;
+  esac
+done
+echo "$passed passed, $failed failed, $skipped skipped"
+[ "$failed" -eq 0 ]
