@@ -1,9 +1,9 @@
 #!/usr/bin/perl
 # SPDX-License-Identifier: Apache-2.0
-# Checks texts line by line, for scripts/lint.sh; prints 'file:line: rule: what', exit code 1 if it found anything.
+# Checks texts line by line, for lint.sh; prints 'file:line: rule: what', exit code 1 if it found anything.
 #
 #   scripts/lint_text.pl text FILE ...    ASCII, LF, final newline, tabs, trailing blanks, 120 columns, SPDX
-#   scripts/lint_text.pl vhdl FILE ...    constructs that GHDL 2.0 turns into wrong Verilog, or that VHDL-93 tools refuse
+#   scripts/lint_text.pl vhdl FILE ...    constructs that GHDL 2.0 turns into wrong Verilog, or that are not VHDL-93
 #   scripts/lint_text.pl units FILE ...   every entity has a golden model, a test and a page
 #   scripts/lint_text.pl links FILE ...   relative links of the Markdown files lead to files
 #
@@ -82,8 +82,8 @@ sub check_text {
 }
 
 # --- vhdl ---
-my $reserved = join '|', qw(always assign automatic casex casez cell config deassign defparam design disable edge endcase
-  endconfig endfunction endgenerate endmodule endprimitive endspecify endtable endtask event force forever fork highz0
+my $reserved = join '|', qw(always assign automatic casex casez cell config deassign defparam design disable edge
+  endcase endconfig endfunction endgenerate endmodule endprimitive endspecify endtable endtask event force forever fork highz0
   highz1 ifnone incdir include initial inout input instance integer_vector join large liblist localparam macromodule
   medium module negedge nmos noshowcancelled notif0 notif1 output parameter pmos posedge primitive pull0 pull1 pulldown
   pullup rcmos reg release repeat rnmos rpmos rtran small specify specparam strong0 strong1 supply0 supply1 table task

@@ -7,7 +7,7 @@ case ${1:-} in
   -h | --help | '') sed -n '3,4s/^# //p' "$0"; exit 0 ;;
 esac
 a=$1 b=$2 compared=0 differ=0
-for name in $(ls "$a" "$b" | grep -v -e ':$' -e '^$' -e '^report\.json$' | sort -u); do
+for name in $(find "$a" "$b" -mindepth 1 -maxdepth 1 ! -name report.json -exec basename {} \; | sort -u); do
   compared=$((compared + 1))
   cmp "$a/$name" "$b/$name" || differ=$((differ + 1))
 done

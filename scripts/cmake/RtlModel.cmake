@@ -92,7 +92,8 @@ function(rtl_model name)
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${obj}
     COMMAND ${PSWEEP_VERILATOR} --cc ${PSWEEP_VERILATOR_FLAGS} ${trace_flag} --prefix V${name} --Mdir ${obj}
             --top-module ${A_TOP} ${waivers} ${dir}/${A_TOP}.v
-    COMMAND ${CMAKE_COMMAND} -D OBJ=${obj} -D FAST=${fast} -D SLOW=${slow} -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
+    COMMAND ${CMAKE_COMMAND} -D OBJ=${obj} -D FAST=${fast} -D SLOW=${slow}
+            -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
     DEPENDS ${dir}/${A_TOP}.v ${waivers} ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
     COMMENT "Verilator ${name}"
     VERBATIM)
