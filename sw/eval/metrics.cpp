@@ -14,9 +14,8 @@ constexpr double kLarge = 0.02;  // metres
 
 void require_size(const char* name, const FloatImage& image, int width, int height) {
   if (image.width != width || image.height != height) {
-    throw InputError(std::string(name) + ": found " + std::to_string(image.width) + "x" +
-                     std::to_string(image.height) + ", expected " + std::to_string(width) + "x" +
-                     std::to_string(height));
+    throw InputError(std::string(name) + ": found " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                     ", expected " + std::to_string(width) + "x" + std::to_string(height));
   }
 }
 

@@ -14,12 +14,12 @@
 namespace psweep {
 
 struct Metrics {
-  double M1_mm = 0;       // RMS of the errors up to 2 cm
-  double M2a_percent = 0; // share of reconstructed cells with a larger error
-  double M2b_mm = 0;      // RMS of those larger errors
-  double M3_percent = 0;  // share of evaluated cells that are reconstructed
-  double M4_px = 0;       // mean size of an 8-connected hole, cells; 0 without holes
-  double rms_mm = 0;      // consolidated: RMS of all errors
+  double M1_mm = 0;        // RMS of the errors up to 2 cm
+  double M2a_percent = 0;  // share of reconstructed cells with a larger error
+  double M2b_mm = 0;       // RMS of those larger errors
+  double M3_percent = 0;   // share of evaluated cells that are reconstructed
+  double M4_px = 0;        // mean size of an 8-connected hole, cells; 0 without holes
+  double rms_mm = 0;       // consolidated: RMS of all errors
   size_t evaluated = 0, reconstructed = 0, large_errors = 0, holes = 0;  // holes: connected pieces
 };
 
@@ -31,11 +31,11 @@ Metrics evaluate(const FloatImage& depth, const FloatImage& truth, const Rig& ri
                  int window);
 
 struct Comparison {
-  size_t both = 0;                  // cells with a depth in both
-  double within_quarter_mm = 0;     // percent of them that differ by at most 0.25 mm
-  double off_2cm = 0;               // percent of them that differ by more than 2 cm
-  double same_holes = 0;            // percent of the reference's holes that are holes in the other, too
-  double same_coverage = 0;         // percent of all cells that are hole in both or depth in both
+  size_t both = 0;               // cells with a depth in both
+  double within_quarter_mm = 0;  // percent of them that differ by at most 0.25 mm
+  double off_2cm = 0;            // percent of them that differ by more than 2 cm
+  double same_holes = 0;         // percent of the reference's holes that are holes in the other, too
+  double same_coverage = 0;      // percent of all cells that are hole in both or depth in both
   size_t reference_holes = 0;
 };
 

@@ -18,9 +18,9 @@ namespace psweep {
 namespace {
 
 constexpr int kBandRows = 48;
-constexpr double kEdge = 1e-9;       // positions this far outside count as on the border: rounding of the projection
-constexpr double kConstant = 1e-6;   // variance of both windows, grey levels squared, below which they are constant
-constexpr float kInvalid = -1.0f;    // V of a cell that is not inside at this plane
+constexpr double kEdge = 1e-9;      // positions this far outside count as on the border: rounding of the projection
+constexpr double kConstant = 1e-6;  // variance of both windows, grey levels squared, below which they are constant
+constexpr float kInvalid = -1.0f;   // V of a cell that is not inside at this plane
 
 void require(bool ok, const std::string& message) {
   if (!ok) throw InputError(message);
@@ -55,7 +55,7 @@ struct Cell {
   int16_t plane = -1;         // of the winner
   bool before_valid = false;  // the last plane was inside
   bool before2_valid = false;
-  bool local = false;         // the winner is a local maximum
+  bool local = false;  // the winner is a local maximum
   bool inside = false, textured = false;
 };
 
@@ -65,7 +65,7 @@ struct Job {
   int window;
   double threshold;
   const FloatOptions& options;
-  const FloatImage& left;   // resampled to the map's rows
+  const FloatImage& left;  // resampled to the map's rows
   const FloatImage& right;
   const Axis& left_rows;
   const Axis& right_rows;

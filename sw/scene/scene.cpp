@@ -23,18 +23,18 @@ constexpr double kMast = 1.0, kBaseline = 0.20;
 constexpr double kSinTilt = 0.62932039104983745, kCosTilt = 0.77714596145697088;  // 39 degrees
 
 // Samples per pixel, across and down. More down: far ground is seen at 15 degrees, four times as long as wide.
-constexpr int kAcross = 2, kDown = 3;
+constexpr int kAcross = 2, kDown = 4;
 // Point spread of pixel and lens, in samples: a tent two pixels wide, so that the sampling is nearly alias-free.
 constexpr std::array<float, 4> kSpreadAcross{1 / 8.0f, 3 / 8.0f, 3 / 8.0f, 1 / 8.0f};
-constexpr std::array<float, 5> kSpreadDown{1 / 9.0f, 2 / 9.0f, 3 / 9.0f, 2 / 9.0f, 1 / 9.0f};
+constexpr std::array<float, 6> kSpreadDown{1 / 18.0f, 3 / 18.0f, 5 / 18.0f, 5 / 18.0f, 3 / 18.0f, 1 / 18.0f};
 
 struct Look {
-  float mean;              // grey value of level, fully lit sand
-  float sand, rock;        // contrast of one octave of texture
-  float noise;             // sensor: grey levels, standard deviation at the mean
+  float mean;        // grey value of level, fully lit sand
+  float sand, rock;  // contrast of one octave of texture
+  float noise;       // sensor: grey levels, standard deviation at the mean
 };
-constexpr Look kRockyLook{124, 0.085f, 0.11f, 1.2f};
-constexpr Look kFlatLook{136, 0.055f, 0.08f, 1.2f};
+constexpr Look kRockyLook{124, 0.070f, 0.085f, 1.2f};
+constexpr Look kFlatLook{136, 0.050f, 0.070f, 1.2f};
 
 // Ray of pixel coordinates (px,py) from an eye `shift` metres right of the cyclopean one; the parameter is depth Z.
 Ray pixel_ray(const Camera& c, double shift, double px, double py) {
@@ -50,8 +50,8 @@ float texture(uint32_t seed, double x, double y, double h, double shortest) {
   double wave = 0.32;
   for (uint32_t octave = 0; wave > shortest && wave > 0.0006; ++octave, wave *= 0.5) {
     const float keep = static_cast<float>(std::min(1.0, wave / shortest - 1));
-    // Coarse stains are fainter than the grain.
-    const float gain = wave > 0.03 ? 0.6f : 1.0f;
+    // Grain and grit dominate, stains are faint: texture is even everywhere, near and far.
+    const float gain = wave > 0.03 ? 0.3f : wave > 0.015 ? 1.0f : 1.6f;
     sum += keep * gain * scene::noise3(seed + octave, u / wave, v / wave, w / wave);
     const double turned = 0.8 * u - 0.6 * v;
     v = 0.6 * u + 0.8 * v;
@@ -64,7 +64,10 @@ float texture(uint32_t seed, double x, double y, double h, double shortest) {
 class Renderer {
  public:
   Renderer(const Terrain& terrain, SceneKind kind, uint32_t seed, const Rig& rig, int threads)
-      : terrain_(terrain), look_(kind == SceneKind::kRocky ? kRockyLook : kFlatLook), seed_(seed), rig_(rig),
+      : terrain_(terrain),
+        look_(kind == SceneKind::kRocky ? kRockyLook : kFlatLook),
+        seed_(seed),
+        rig_(rig),
         threads_(threads) {}
 
   Gray image(const Camera& camera, double shift, uint32_t noise_seed, const std::function<void(double)>& progress) {

@@ -19,7 +19,7 @@ constexpr double kLeft = -2.5, kRight = 2.5, kNear = 0.2, kFar = 5.2;
 
 // Towards the sun, unit length. High and hazy: on Mars dust scatters much of the light, so shadows are soft and weak.
 constexpr double kSunX = -0.5883, kSunY = 0.3922, kSunH = 0.7071;
-constexpr float kAmbient = 0.62f, kSun = 0.38f;
+constexpr float kAmbient = 0.56f, kSun = 0.44f;
 
 struct Kind {
   double relief;               // height of one octave of undulation per wavelength
@@ -29,9 +29,9 @@ struct Kind {
   double largest;              // diameter of the largest rock
   double rock_tone, tone_var;  // brightness of rock against sand
 };
-constexpr double kSmallest = 0.007;  // diameter
-constexpr Kind kRockyKind{0.026, 0.040, 0.0, 420, 0.30, 0.86, 0.16};
-constexpr Kind kFlatKind{0.016, 0.024, 0.0045, 110, 0.09, 0.90, 0.10};
+constexpr double kSmallest = 0.005;  // diameter
+constexpr Kind kRockyKind{0.024, 0.040, 0.0, 520, 0.25, 0.98, 0.22};
+constexpr Kind kFlatKind{0.014, 0.026, 0.0035, 210, 0.10, 0.98, 0.16};
 
 struct Facet {
   double nx, ny, offset, slope;  // height over the centre = offset - slope * (nx * x + ny * y)
@@ -222,9 +222,15 @@ void Terrain::place_rocks(SceneKind kind, uint64_t seed) {
         const double a = cx * dx + cy * dy, b = (cx * dy - cy * dx) / stretch;
         double h;
         if (rounded) {
-          const double q = (a * a + b * b) / (radius * radius);
+          // A lumpy dome with one broken side and a worn top.
+          const double lump = 1 + 0.45 * noise2(own_seed + 9, a / diameter * 2.2, b / diameter * 2.2);
+          const double q = (a * a + b * b) / (radius * radius) * lump;
           if (q >= 1.2) continue;
           h = tall * (q < 1 ? std::sqrt(1 - q * q) : -4 * (q - 1));
+          for (const int f : {0, 2, n - 1}) {
+            h = smooth_min(h, facets[f].offset - facets[f].slope * (facets[f].nx * a + facets[f].ny * b),
+                           0.12 * diameter);
+          }
         } else {
           h = facets[0].offset - facets[0].slope * (facets[0].nx * a + facets[0].ny * b);
           for (int f = 1; f < n; ++f) {
@@ -287,10 +293,13 @@ void Terrain::light(int threads, const std::function<void(double)>& progress) {
         lit = std::min(lit, std::max(0.0, 0.5 - excess));
       }
       const size_t at = static_cast<size_t>(j) * cols_ + i;
-      const float open = 1 / (1 + 1.6f * sky[at]);
-      const float light = kAmbient * static_cast<float>(0.5 + 0.5 * nh) * open +
-                          kSun * static_cast<float>(cosine * std::min(1.0, lit));
-      radiance_[at] = light / level * (tone_[at] * (1.0f / 128.0f));
+      const float open = 1 / (1 + 1.1f * sky[at]);
+      // Dust lies where a face is nearly level, and has the brightness of sand.
+      const float dust = 0.6f * fade(std::min(1.0f, std::max(0.0f, static_cast<float>(nh - 0.75) * 5.0f)));
+      const float tone = lerp(tone_[at] * (1.0f / 128.0f), 1.0f, dust);
+      const float light =
+          kAmbient * static_cast<float>(0.5 + 0.5 * nh) * open + kSun * static_cast<float>(cosine * std::min(1.0, lit));
+      radiance_[at] = light / level * tone;
       steep_[at] = to_byte(255 * nh);
     }
   });

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures accuracy on synthetic terrain and prints Markdown tables (docs/accuracy.md quotes them).
 //   psweep_accuracy [--size N] [--threads N] [--seeds 1,2,3] [--save DIR] EXPERIMENT ...
-// Experiments: float, fixed, formats, mncc, rules, cleanup. --save writes the pairs as PGM files.
+// Experiments: float, fixed, formats, mncc, rules, cleanup. --save writes pairs, depth and error maps as PNG files into
+// DIR.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <string>
@@ -17,6 +17,8 @@
 #include "eval/cleanup.hpp"
 #include "eval/metrics.hpp"
 #include "fast/fast.hpp"
+#include "io/image_io.hpp"
+#include "io/picture.hpp"
 #include "plan/planner.hpp"
 #include "reference/reference.hpp"
 #include "scene/scene.hpp"
@@ -40,16 +42,7 @@ struct Options {
   }
 };
 
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-void save_pgm(const std::string& path, const Gray& image) {
-  std::ofstream file(path, std::ios::binary);
-  file << "P5\n" << image.width << " " << image.height << "\n255\n";
-  file.write(reinterpret_cast<const char*>(image.data.data()), static_cast<std::streamsize>(image.data.size()));
-  if (!file) throw InputError(path + ": cannot write");
-}
+double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 class Bench {
  public:
@@ -59,13 +52,17 @@ class Bench {
     scene_ = render(kind, seed, options.size, options.threads);
     std::fprintf(stderr, "%s: rendered in %.1f s\n", name_.c_str(), seconds() - start);
     if (!options.save.empty()) {
-      const std::string stem = options.save + "/" + name_.substr(0, name_.find(' ')) + std::to_string(seed);
-      save_pgm(stem + "_left.pgm", scene_.left);
-      save_pgm(stem + "_right.pgm", scene_.right);
+      write_png(stem() + "_left.png", scene_.left);
+      write_png(stem() + "_right.png", scene_.right);
+      write_png(stem() + "_truth.png", depth_picture(scene_.truth, spacing_));
     }
     selected_ = evaluated_cells(scene_.truth, scene_.rig, spacing_, kWindow);
     plain_ = run("float", [&] { return floating({}); });
     report("float", plain_, false);
+    if (!options.save.empty()) {
+      write_png(stem() + "_float.png", depth_picture(plain_.depth, spacing_));
+      write_png(stem() + "_error.png", error_picture(plain_.depth, scene_.truth, 1000, 20, "mm"));
+    }
   }
 
   void experiments() {
@@ -97,6 +94,12 @@ class Bench {
   }
 
  private:
+  std::string stem() const {
+    std::string file = name_;
+    file[file.find(' ')] = '_';
+    return options_.save + "/" + file;
+  }
+
   DepthResult floating(const FloatOptions& o) const {
     return run_float(scene_.left, scene_.right, scene_.rig, spacing_, kWindow, kThreshold, o, options_.threads);
   }
@@ -114,8 +117,7 @@ class Bench {
         "fixed 8." + std::to_string(interp) + ", MNCC " + std::to_string(mncc) + ", weight " + std::to_string(weight);
     FastOptions o;
     o.threads = options_.threads;
-    const DepthResult r =
-        run(name, [&] { return to_result(setup, run_fixed(scene_.left, scene_.right, setup, o)); });
+    const DepthResult r = run(name, [&] { return to_result(setup, run_fixed(scene_.left, scene_.right, setup, o)); });
     report(name, r, true);
     if (with_cleanup) cleaned(name + " + both", r, true, true);
   }
@@ -190,8 +192,9 @@ Options parse(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     const psweep::Options options = psweep::parse(argc, argv);
-    std::printf("| scene | engine | M1 mm | M2.a %% | M2.b mm | M3 %% | M4 px | RMS mm | <= 0.25 mm of float %% | "
-                "> 2 cm %% | float's holes kept %% | hole or depth as float %% |\n");
+    std::printf(
+        "| scene | engine | M1 mm | M2.a %% | M2.b mm | M3 %% | M4 px | RMS mm | <= 0.25 mm of float %% | "
+        "> 2 cm %% | float's holes kept %% | hole or depth as float %% |\n");
     std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const auto kind : {psweep::SceneKind::kRocky, psweep::SceneKind::kFlat}) {
       for (const uint64_t seed : options.seeds) psweep::Bench(options, kind, seed).experiments();
