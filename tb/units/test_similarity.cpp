@@ -7,6 +7,7 @@
 #include "Vsimilarity_13.h"
 #include "Vsimilarity_21.h"
 #include "Vsimilarity_3.h"
+#include "Vsimilarity_5.h"
 #include "golden/similarity.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -156,6 +157,7 @@ void run_window(int window, int sample_bits, int mncc_bits, int max_cols) {
 }  // namespace
 
 TEST_CASE("similarity: 3 x 3, 8-bit samples") { run_window<Vsimilarity_3>(3, 8, 16, 19); }
+TEST_CASE("similarity: 5 x 5, samples 8.3") { run_window<Vsimilarity_5>(5, 11, 9, 16); }
 TEST_CASE("similarity: 13 x 13, samples 8.2") { run_window<Vsimilarity_13>(13, 10, 13, 37); }
 TEST_CASE("similarity: 21 x 21, samples 8.8") { run_window<Vsimilarity_21>(21, 16, 4, 40); }
 
