@@ -44,8 +44,8 @@ package psweep_pkg is
   function similarity_latency (mncc_w : positive) return positive;
   function updating_latency (frac_w : positive) return positive;
 
-  -- Bits that hold 0 .. n-1, at least 1.
-  function clog2 (n : positive) return positive;
+  -- Bits that hold 0 .. n-1, at least 1. An illegal n (below 1) is for the assertion of who uses it to report.
+  function clog2 (n : integer) return positive;
 
   function imax (a, b : integer) return integer;
 
@@ -63,7 +63,7 @@ package body psweep_pkg is
     return 4 + frac_w;
   end function updating_latency;
 
-  function clog2 (n : positive) return positive is
+  function clog2 (n : integer) return positive is
     variable v_bits : positive := 1;
   begin
     while 2 ** v_bits < n loop
