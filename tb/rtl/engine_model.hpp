@@ -87,6 +87,7 @@ class VerilatedEngine : public EngineModel {
     }
     dut_->rst = 0;
     table_written_ = false;
+    published_ = clock_;  // a reset is no work
   }
   // One clock is low(), which settles everything before the edge, and high(), the edge.
   void low() {
