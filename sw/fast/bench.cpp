@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// psweep_bench [name=value ...]: seconds per frame of the bit-true model, for every instruction set of this machine.
-// Names: size planes threads band_rows window interp_frac mncc_bits row_offset (pixels) focal_percent (right camera's
-// longer focal length) runs; without any, the paper's rig and the default format. Images: noise smoothed over 5 pixels,
-// the right one shifted by the disparity of a middle plane.
+// psweep_bench [name=value ...]: seconds per frame of the bit-true model, for every instruction set of this machine (or
+// the one in the environment variable PSWEEP_SIMD). Names: size planes threads band_rows window interp_frac mncc_bits
+// row_offset (pixels) focal_percent (right camera's longer focal length) runs; without any, the paper's rig and the
+// default format. Images: noise smoothed over 5 pixels, the right one shifted by the disparity of a middle plane.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -58,7 +58,8 @@ int main(int argc, char** argv) try {
   setup.format.planes = 1024;
   setup.threshold = psweep::threshold_for(setup.format, 0.85);
   const psweep::Gray left = noise(size, 0), right = noise(size, static_cast<int>(60 * scale));
-  for (const auto level : psweep::simd_levels()) {
+  const bool one = std::getenv("PSWEEP_SIMD") != nullptr;
+  for (const auto level : one ? std::vector<psweep::SimdLevel>{psweep::best_simd_level()} : psweep::simd_levels()) {
     psweep::FastOptions options;
     options.level = level;
     options.threads = argument("threads", 1);

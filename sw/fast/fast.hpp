@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bit-true model at speed: every map cell equals golden::run_tile's, on any tiling, in any legal format.
 // Whole frames need no tiles here: the map is cut into bands of rows, each swept over all planes while its map words
-// stay in the cache. Results do not depend on the number of threads or the instruction set. docs/planner.md.
+// stay in the cache. Results do not depend on the number of threads or the instruction set. docs/fast.md.
 #pragma once
 #include <functional>
 #include <string>

@@ -412,13 +412,11 @@ golden::Pixels cut_window(const Gray& image, int x, int y, int cols, int rows) {
   return window;
 }
 
-uint64_t tile_clocks(const golden::Config& format, const golden::TileJob& job) {
-  return golden::load_clocks(job) + golden::sweep_clocks(format, job) + golden::unload_clocks(job);
-}
-
 uint64_t plan_clocks(const golden::Config& format, const Plan& plan) {
   uint64_t sum = 0;
-  for (const auto& t : plan.tiles) sum += tile_clocks(format, t.job);
+  for (const auto& t : plan.tiles) {
+    sum += golden::load_clocks(t.job) + golden::sweep_clocks(format, t.job) + golden::unload_clocks(t.job);
+  }
   return sum;
 }
 

@@ -79,8 +79,8 @@ TileSize largest_tile(const SweepSetup& setup);
 // Window of an image; pixels beyond the border repeat it.
 golden::Pixels cut_window(const Gray& image, int x, int y, int cols, int rows);
 
-// Clocks of one tile / of a whole plan, load and unload included, without stalls.
-uint64_t tile_clocks(const golden::Config& format, const golden::TileJob& job);
+// Clocks of all tiles one after the other: every pixel loaded, sample swept and cell sent takes one. Filling of
+// pipelines (golden/control.hpp) and stalls of the streams come on top.
 uint64_t plan_clocks(const golden::Config& format, const Plan& plan);
 
 // Puts the cells of one tile (raster order) into the map. blank_map(): every cell outside.
