@@ -15,4 +15,5 @@ if [ ! -e build/build.ninja ]; then cmake --preset release; fi
 options=(--parallel "${JOBS:-$(nproc)}")
 if [ -n "${VERBOSE:-}" ]; then options+=(--verbose); fi
 if [ $# -gt 0 ]; then options+=(--target "$@"); fi
-cmake --build build "${options[@]}"
+# CMake takes a VERBOSE of any value, even an empty one, as a wish.
+exec env -u VERBOSE cmake --build build "${options[@]}"
