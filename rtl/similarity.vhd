@@ -194,7 +194,6 @@ architecture rtl of similarity is
   signal div_quot     : std_logic_vector(G_MNCC_W - 1 downto 0);
   signal div_textured : std_logic_vector(0 downto 0);
   signal flags_s4     : std_logic_vector(0 downto 0);
-  signal flags_s8     : std_logic_vector(1 downto 0);
   signal flags_out    : std_logic_vector(1 downto 0);
   signal flags_s12    : std_logic_vector(0 downto 0);
   signal s6_flags     : std_logic_vector(0 downto 0);
