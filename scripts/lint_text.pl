@@ -82,13 +82,15 @@ sub check_text {
 }
 
 # --- vhdl ---
-my $reserved = join '|', qw(always assign automatic casex casez cell config deassign defparam design disable edge
-  endcase endconfig endfunction endgenerate endmodule endprimitive endspecify endtable endtask event force forever fork highz0
-  highz1 ifnone incdir include initial inout input instance integer_vector join large liblist localparam macromodule
-  medium module negedge nmos noshowcancelled notif0 notif1 output parameter pmos posedge primitive pull0 pull1 pulldown
-  pullup rcmos reg release repeat rnmos rpmos rtran small specify specparam strong0 strong1 supply0 supply1 table task
-  tran tri tri0 tri1 triand trior trireg uwire vectored wand weak0 weak1 wire wor logic bit byte int static unique
-  priority final do);
+my $reserved = join '|', qw(
+  always assign automatic casex casez cell config deassign defparam design disable edge endcase endconfig
+  endfunction endgenerate endmodule endprimitive endspecify endtable endtask event force forever fork highz0
+  highz1 ifnone incdir include initial inout input instance integer_vector join large liblist localparam
+  macromodule medium module negedge nmos noshowcancelled notif0 notif1 output parameter pmos posedge
+  primitive pull0 pull1 pulldown pullup rcmos reg release repeat rnmos rpmos rtran small specify specparam
+  strong0 strong1 supply0 supply1 table task tran tri tri0 tri1 triand trior trireg uwire vectored wand
+  weak0 weak1 wire wor logic bit byte int static unique priority final do
+);
 my @vhdl_rules = (
     [ 'others', qr/\bwhen\s+others\s*=>(?!\s*null\b)/, 'GHDL 2.0 loses it: list every choice, or use if/elsif' ],
     [ 'with_select', qr/\bwith\b[^;]*\bselect\b/, 'GHDL 2.0 loses the default: use when/else' ],
