@@ -7,7 +7,7 @@
 --   Method  : non-restoring, one quotient bit a stage: remainder' = 2 remainder -/+ den, subtracting after a remainder
 --             >= 0. The signs are those of restoring division, without its multiplexer: one adder a stage.
 --   Reset   : none; validity travels outside
---   Why so  : the first stage and, behind it, a divider of one bit less. Recursion gives every stage signals of its own,
+--   Why so  : the first stage and, behind it, a divider of one bit less. Recursion gives every stage its own signals,
 --             where an array of remainders would become one wide word in the converted netlist.
 --   Golden  : divide_fraction() in sw/golden/similarity.hpp
 library ieee;
