@@ -6,7 +6,8 @@
 //   and combinational outputs. Test code between ticks may set inputs directly: they hold until changed.
 //   cycle() counts rising edges outside reset(); tick() throws after `timeout` of them.
 //   Registers and RAMs without reset start with random contents (seeded).
-//   Waves: file name in `wave`, else environment PSWEEP_WAVE; only for models built with TRACE.
+//   Waves: file name in `wave`; environment PSWEEP_WAVE names one for the first simulation of a program. Only for
+//   models built with TRACE.
 #pragma once
 #include <verilated.h>
 #if VM_TRACE
@@ -89,7 +90,11 @@ class Sim {
   }
   void open_wave([[maybe_unused]] std::string wave) {
 #if VM_TRACE
-    if (wave.empty() && std::getenv("PSWEEP_WAVE")) wave = std::getenv("PSWEEP_WAVE");
+    static const char* from_environment = std::getenv("PSWEEP_WAVE");
+    if (wave.empty() && from_environment) {
+      wave = from_environment;
+      from_environment = nullptr;
+    }
     if (wave.empty()) return;
     context_.traceEverOn(true);
     trace_ = std::make_unique<VerilatedFstC>();
