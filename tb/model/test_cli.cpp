@@ -186,6 +186,62 @@ TEST_CASE("options change what they say", "[cli]") {
   }
 }
 
+TEST_CASE("the float engine rounds the correlation and the parabola when told so", "[cli]") {
+  const TemporaryDir dir;
+  write_wall(dir, 10);
+  const std::string base = kInput + std::string("--engine float ");
+  int run = 0;
+  for (const char* options : {"", "--mncc-bits 13", "--mncc-bits 13 --frac-bits 2", "--mncc-bits 6"}) {
+    INFO(options);
+    REQUIRE(psweep_run(dir, base + options + " -o r" + std::to_string(run)).code == 0);
+    for (int other = 0; other < run; ++other) {
+      CHECK_FALSE(same_bytes(dir / ("r" + std::to_string(other)) / "depth.pfm",
+                             dir / ("r" + std::to_string(run)) / "depth.pfm"));
+    }
+    ++run;
+  }
+}
+
+TEST_CASE("each part of the clean-up has its switch", "[cli]") {
+  const TemporaryDir dir;
+  write_wall(dir, 12);
+  // A patch of the right image from elsewhere: false matches, which both parts have to find.
+  cv::Mat right = cv::imread((dir / "right.png").string(), cv::IMREAD_UNCHANGED);
+  cv::Mat patch = right(cv::Rect(60, 10, 14, 14)).clone();
+  patch.copyTo(right(cv::Rect(30, 30, 14, 14)));
+  cv::Mat left = cv::imread((dir / "left.png").string(), cv::IMREAD_UNCHANGED);
+  patch.copyTo(left(cv::Rect(50, 30, 14, 14)));  // the same texture 20 px apart: a nearer square before the wall
+  REQUIRE(cv::imwrite((dir / "left.png").string(), left));
+  REQUIRE(cv::imwrite((dir / "right.png").string(), right));
+  struct Case {
+    const char* options;
+    bool uniqueness, speckle;
+  };
+  for (const Case& c :
+       {Case{"", false, false}, Case{"--cleanup", true, true}, Case{"--cleanup --no-speckle", true, false},
+        Case{"--cleanup --no-uniqueness", false, true}, Case{"--cleanup --no-uniqueness --no-speckle", false, false}}) {
+    INFO(c.options);
+    REQUIRE(psweep_run(dir, kInput + std::string("--threshold 0.3 -o out ") + c.options).code == 0);
+    const auto report = nlohmann::json::parse(read_file(dir / "out/report.json"));
+    CHECK(report["cleanup"]["uniqueness"] == c.uniqueness);
+    CHECK(report["cleanup"]["speckle"] == c.speckle);
+    const cv::Mat mask = cv::imread((dir / "out/mask.png").string(), cv::IMREAD_UNCHANGED);
+    const FloatImage depth = read_pfm(dir / "out/depth.pfm");
+    int bits[2] = {};
+    for (int y = 0; y < 72; ++y) {
+      for (int x = 0; x < 96; ++x) {
+        bits[0] += (mask.at<uint8_t>(y, x) & 16) != 0;
+        bits[1] += (mask.at<uint8_t>(y, x) & 32) != 0;
+        if (mask.at<uint8_t>(y, x) & 48) CHECK_FALSE(std::isfinite(depth.at(x, y)));
+      }
+    }
+    CHECK((bits[0] > 0) == c.uniqueness);
+    CHECK((bits[1] > 0) == c.speckle);
+    CHECK(report["cells"]["removed_by_uniqueness"] == bits[0]);
+    CHECK(report["cells"]["removed_as_speckle"] == bits[1]);
+  }
+}
+
 TEST_CASE("an existing output directory is replaced file by file", "[cli]") {
   const TemporaryDir dir;
   write_wall(dir);
@@ -300,6 +356,60 @@ TEST_CASE("--engine rtl without a fitting configuration says how to build one", 
 #endif
   CHECK_FALSE(fs::exists(dir / "out"));
 }
+
+#ifdef PSWEEP_HAVE_RTL
+TEST_CASE("--engine rtl writes the bytes of --engine fixed", "[cli][rtl]") {
+  const TemporaryDir dir;
+  write_wall(dir);
+  // Window and formats of the configuration, its own tiles and smaller ones, with clean-up and without. The number of
+  // planes is odd, so that the middle one is the wall.
+  for (const char* options : {"--config tiny --planes 11", "--config tiny --planes 7 --tile 9x5 --cleanup",
+                              "--config odd --planes 19 --threads 1", "--config odd --planes 19 --threads 3"}) {
+    const std::string base = "depth left.png right.png --calib calib.yaml " + std::string(options);
+    const Outcome fixed = psweep_run(dir, base + " --engine fixed -o fixed");
+    const Outcome rtl = psweep_run(dir, base + " --engine rtl -o rtl");
+    INFO(options << fixed.err << rtl.err);
+    REQUIRE(fixed.code == 0);
+    REQUIRE(rtl.code == 0);
+    int compared = 0;
+    for (const auto& name : kFiles) {
+      if (name == "report.json") continue;
+      INFO(name);
+      CHECK(same_bytes(dir / "fixed" / name, dir / "rtl" / name));
+      ++compared;
+    }
+    CHECK(compared == 6);
+    const auto report = nlohmann::json::parse(read_file(dir / "rtl/report.json"));
+    CHECK(report["cells"]["with_depth"] > 1000);
+    CHECK(report["rtl"]["clocks"] > 10000);
+    CHECK(report["rtl"]["clocks_in_all"] > report["rtl"]["clocks"]);
+    CHECK_FALSE(nlohmann::json::parse(read_file(dir / "fixed/report.json")).contains("rtl"));
+    const Outcome page = psweep_run(dir, "report fixed rtl -o page.html");
+    REQUIRE(page.code == 0);
+    CHECK(read_file(dir / "page.html").find("wrote the same bytes in all 6 files") != std::string::npos);
+  }
+}
+
+TEST_CASE("an RTL configuration's limits are told", "[cli][rtl][error]") {
+  const TemporaryDir dir;
+  write_wall(dir);
+  struct Case {
+    const char *options, *message;
+  };
+  const std::string base = "depth left.png right.png --calib calib.yaml -o out --engine rtl --config tiny ";
+  for (const Case& c : {Case{"--planes 13", "--planes: found 13, but configuration 'tiny' has room for 12"},
+                        Case{"--window 7", "--window: found 7, but configuration 'tiny' has 5"},
+                        Case{"--mncc-bits 9", "--mncc-bits: found 9, but configuration 'tiny' has 13"},
+                        Case{"--tile 17x12", "make config NAME="},
+                        Case{"--zmin 0.3", "configuration 'tiny' cannot serve this request"}}) {
+    const Outcome o = psweep_run(dir, base + c.options);
+    INFO(c.options << "\n" << o.err);
+    CHECK(o.code == 2);
+    CHECK_THAT(o.err, contains(c.message));
+    CHECK_FALSE(fs::exists(dir / "out"));
+  }
+}
+#endif
 
 TEST_CASE("help and version", "[cli]") {
   const TemporaryDir dir;
