@@ -162,7 +162,7 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #24292f; background: #f6f7f8
 main { max-width: 1240px; margin: 0 auto; padding: 24px; }
 h1 { font-size: 26px; margin: 8px 0 4px; } h2 { font-size: 18px; margin: 32px 0 8px; }
 p { margin: 4px 0 12px; max-width: 80ch; }
-.row { display: grid; grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); gap: 16px; align-items: start; }
+.row { display: grid; grid-template-columns: repeat(auto-fit, minmax(260px, 1fr)); gap: 16px; align-items: start; }
 figure { margin: 0; background: #fff; border: 1px solid #d8dde3; border-radius: 8px; padding: 10px; }
 figure img { width: 100%; height: auto; display: block; }
 figcaption { font-size: 13px; color: #57606a; margin-top: 8px; }
@@ -248,9 +248,15 @@ void report_command(const ReportOptions& o) {
   if (any) {
     page << "<h2>Accuracy</h2>\n";
     if (metric) {
-      page
-          << "<p>The paper's figures are Table 1 of Lentaris et al., ACM TECS 18(2):16, 2019, for 1120x1120 images and "
-             "301 planes of its own scenes; compare only at that size.</p>\n";
+      page << "<p>The paper's figures are Table 1 of Lentaris et al., ACM TECS 18(2):16, 2019, for 1120x1120 images, a "
+              "focal "
+              "length of 1200 px and 301 planes, on its own scenes.";
+      const double fx = first.record.rig.cyclopean().fx;
+      if (fx < 1100) {
+        page << " This run has " << text(fx, "%.0f") << " px: the same error in pixels is " << text(1200 / fx, "%.1f")
+             << " times as many millimetres, so only a run at full size compares like with like.";
+      }
+      page << "</p>\n";
     }
     page << table(kMetrics, runs, metric);
   }
