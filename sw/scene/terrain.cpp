@@ -30,6 +30,8 @@ struct Kind {
   double rock_tone, tone_var;  // brightness of rock against sand
 };
 constexpr double kSmallest = 0.005;  // diameter
+// No rock higher than a wheel can climb lies within the rover's own length: it could not have come to stand there.
+constexpr double kWheelRock = 0.14, kWheelReach = 1.0;
 constexpr Kind kRockyKind{0.024, 0.040, 0.0, 520, 0.25, 0.98, 0.22};
 constexpr Kind kFlatKind{0.014, 0.026, 0.0035, 210, 0.10, 0.98, 0.16};
 
@@ -213,6 +215,7 @@ void Terrain::place_rocks(SceneKind kind, uint64_t seed) {
       facets[n++] = {nx, ny, tall * own.uniform(0.85, 1.15), own.uniform(0.05, 0.45)};
     }
     if (diameter < 2.5 * pitch_) continue;  // below the lattice
+    if (diameter > kWheelRock && y < kWheelReach) continue;
     const int ci = static_cast<int>((x - x0_) / pitch_), cj = static_cast<int>((y - y0_) / pitch_);
     const double foot = ground[static_cast<size_t>(cj) * cols_ + ci] - tall * own.uniform(0.05, 0.3);
     const int reach = static_cast<int>(radius * 1.35 / pitch_) + 1;

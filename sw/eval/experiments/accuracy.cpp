@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures accuracy on synthetic terrain and prints Markdown tables (docs/accuracy.md quotes them).
-//   psweep_accuracy [--size N] [--threads N] [--seeds 1,2,3] [--save DIR] EXPERIMENT ...
+//   psweep_accuracy [--size N] [--threads N] [--seeds 1,2,3] [--kind rocky|flat] [--save DIR] EXPERIMENT ...
 // Experiments: float, fixed, formats, mncc, rules, cleanup. --save writes pairs, depth and error maps as PNG files into
 // DIR.
 #include <chrono>
@@ -32,7 +32,7 @@ constexpr double kThreshold = 0.85;
 struct Options {
   int size = 1120, threads = 2;
   std::vector<uint64_t> seeds{1, 2, 3};
-  std::string save;
+  std::string save, kind;  // empty: save nothing, both kinds
   std::vector<std::string> experiments;
   bool wants(const std::string& name) const {
     for (const auto& e : experiments) {
@@ -176,6 +176,8 @@ Options parse(int argc, char** argv) {
       o.threads = std::atoi(value().c_str());
     } else if (word == "--save") {
       o.save = value();
+    } else if (word == "--kind") {
+      o.kind = value();
     } else if (word == "--seeds") {
       o.seeds.clear();
       const std::string list = value();
@@ -200,6 +202,7 @@ int main(int argc, char** argv) {
         "> 2 cm %% | float's holes kept %% | hole or depth as float %% |\n");
     std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const auto kind : {psweep::SceneKind::kRocky, psweep::SceneKind::kFlat}) {
+      if (options.kind == (kind == psweep::SceneKind::kRocky ? "flat" : "rocky")) continue;
       for (const uint64_t seed : options.seeds) psweep::Bench(options, kind, seed).experiments();
     }
   } catch (const psweep::InputError& e) {
