@@ -200,6 +200,17 @@ TEST_CASE("the float engine rounds the correlation and the parabola when told so
     }
     ++run;
   }
+  // Two bits of the parabola: positions lie at plane - 1/2 + (k + 1/2) / 4.
+  const FloatImage depth = read_pfm(dir / "r2/depth.pfm");
+  int found = 0, off = 0;
+  for (const float z : depth.data) {
+    if (!std::isfinite(z)) continue;
+    const double steps = (30 * std::log(static_cast<double>(z)) / std::log(4.0) + 0.5) * 4 - 0.5;
+    ++found;
+    off += std::abs(steps - std::round(steps)) > 0.01;
+  }
+  CHECK(found > 3000);
+  CHECK(off == 0);
 }
 
 TEST_CASE("each part of the clean-up has its switch", "[cli]") {
