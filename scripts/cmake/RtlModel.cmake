@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # VHDL entity + generics -> Verilated C++ library.
 #
-#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE])
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST])
 #     Static library <name> with header V<name>.h (class V<name>) for entity rtl/<entity>.vhd. TRACE: the model can
-#     write FST waves (costs nothing until a file is opened, but longer compilation).
+#     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
 #   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
 #     ctest case: elaboration with these generics has to fail, and the message has to match.
 #
@@ -63,7 +63,7 @@ function(psweep_rtl_sources entity out)
 endfunction()
 
 function(rtl_model name)
-  cmake_parse_arguments(A "TRACE" "TOP" "GENERICS" ${ARGN})
+  cmake_parse_arguments(A "TRACE;FAST" "TOP" "GENERICS" ${ARGN})
   psweep_rtl_sources(${A_TOP} sources)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
   set(obj ${dir}/obj)
@@ -100,7 +100,7 @@ function(rtl_model name)
 
   add_library(${name} STATIC ${fast} ${slow} ${header})
   # Constructors and reset code run once: compiling them without optimisation halves the build.
-  set_source_files_properties(${fast} PROPERTIES COMPILE_OPTIONS "-O3")
+  set_source_files_properties(${fast} PROPERTIES COMPILE_OPTIONS "$<IF:$<BOOL:${A_FAST}>,-O3,-O1>")
   set_source_files_properties(${slow} PROPERTIES COMPILE_OPTIONS "-O0")
   target_compile_options(${name} PRIVATE -w)  # generated code
   target_include_directories(${name} SYSTEM PUBLIC ${obj})

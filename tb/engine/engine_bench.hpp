@@ -27,7 +27,7 @@ struct Stalls {
 template <class Dut>
 class EngineBench : public Agent {
  public:
-  EngineBench(const golden::Config& config, uint32_t seed, Stalls stalls = {}, uint64_t timeout = 20000000)
+  EngineBench(const golden::Config& config, uint32_t seed, Stalls stalls = {}, uint64_t timeout = 1000000)
       : sim(timeout, seed),
         dut(sim.dut()),
         config_(config),

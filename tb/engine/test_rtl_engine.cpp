@@ -69,6 +69,31 @@ TEST_CASE("rtl engine: a rendered pair in tiles and in full-width bands is the m
   CHECK(accepted > from_tiles.data.size() / 4);
 }
 
+TEST_CASE("rtl engine: extreme formats, random tiles") {
+  const std::string name = GENERATE("wide", "narrow", "odd");
+  INFO("configuration " << name << " seed " << test_seed());
+  const rtl::Configuration& c = configuration(name);
+  StimulusMaker maker(c.config, test_seed());
+  rtl::RtlEngine engine(c);
+  Scoreboard cells("cell");
+  for (int tile = 0; tile < 40; ++tile) {
+    const int planes = tile == 0 ? c.config.planes : 1 + maker.below(std::min(c.config.planes, 40));
+    const Stimulus s = maker.make(static_cast<Texture>(tile % 4), static_cast<Geometry>(maker.below(4)),
+                                  1 + maker.below(c.config.plane_cols), 1 + maker.below(c.config.plane_rows), planes);
+    engine.set_table(s.table);
+    const auto out = engine.run(s.job, s.left, s.right);
+    const auto model = golden::run_tile(c.config, s.job, s.table, s.left, s.right);
+    REQUIRE(out.cells.size() == model.cells.size());
+    for (size_t at = 0; at < out.cells.size(); ++at)
+      cells.compare(rtl::pack_cell(c.config, out.cells[at]), rtl::pack_cell(c.config, model.cells[at]),
+                    {tile, -1, static_cast<int>(at) % s.job.tile_cols, static_cast<int>(at) / s.job.tile_cols},
+                    out.clocks);
+    CHECK(out.clocks == golden::engine_clocks(c.config, s.job));
+  }
+  INFO(cells.report());
+  CHECK(cells.ok());
+}
+
 TEST_CASE("rtl engine: clocks and errors of a tile, table kept from tile to tile") {
   const rtl::Configuration& c = configuration("tiny");
   StimulusMaker maker(c.config, test_seed());
