@@ -353,7 +353,7 @@ TEST_CASE("bad input: exit code 2, file and field named, no output", "[cli][erro
   CHECK(cases.size() > 40);
 }
 
-TEST_CASE("--engine rtl without a fitting configuration says how to build one", "[cli][error]") {
+TEST_CASE("command line: --engine rtl without a fitting configuration says how to build one", "[cli][error]") {
   const TemporaryDir dir;
   write_wall(dir);
   const Outcome o = psweep_run(dir, "depth left.png right.png --calib calib.yaml -o out --engine rtl --window 21");
@@ -369,7 +369,7 @@ TEST_CASE("--engine rtl without a fitting configuration says how to build one", 
 }
 
 #ifdef PSWEEP_HAVE_RTL
-TEST_CASE("--engine rtl writes the bytes of --engine fixed", "[cli][rtl]") {
+TEST_CASE("command line: --engine rtl writes the bytes of --engine fixed", "[cli][rtl]") {
   const TemporaryDir dir;
   write_wall(dir);
   // Window and formats of the configuration, its own tiles and smaller ones, with clean-up and without. The number of

@@ -454,7 +454,7 @@ TEST_CASE("raw cameras: rectified rows agree, and the rig measures the right dep
              contains("raw.yml: not a calibration"));
 }
 
-TEST_CASE("--rectify decides where a file holds raw cameras and projections", "[io][calibration]") {
+TEST_CASE("calibration: --rectify decides where a file holds raw cameras and projections", "[io][calibration]") {
   const TemporaryDir dir;
   const Stereo s(cv::CALIB_ZERO_DISPARITY);
   {
