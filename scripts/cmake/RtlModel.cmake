@@ -25,6 +25,13 @@ set(PSWEEP_RTL_MODEL_DIR ${CMAKE_CURRENT_LIST_DIR})
 # -Wall and every warning is an error, but for the waivers of ghdl_netlist.vlt.
 set(PSWEEP_VERILATOR_FLAGS -Wall -O3 --x-initial unique --x-assign unique)
 
+# Newer versions print a page of statistics for every model.
+execute_process(COMMAND ${PSWEEP_VERILATOR} --version OUTPUT_VARIABLE PSWEEP_VERILATOR_VERSION)
+string(REGEX MATCH "[0-9]+\\.[0-9]+" PSWEEP_VERILATOR_VERSION "${PSWEEP_VERILATOR_VERSION}")
+if(PSWEEP_VERILATOR_VERSION VERSION_GREATER_EQUAL 5.030)
+  list(APPEND PSWEEP_VERILATOR_FLAGS --quiet-stats)
+endif()
+
 # The run-time library comes with Verilator as source.
 add_library(verilated_rt STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated.cpp
                                 ${PSWEEP_VERILATOR_ROOT}/include/verilated_threads.cpp)

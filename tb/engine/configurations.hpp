@@ -10,10 +10,10 @@
 
 namespace psweep::tb {
 
-inline const rtl::Configuration& configuration(const std::string& name) {
+inline const rtl::Configuration& configuration(const char* name) {
   for (const auto& c : rtl::configurations())
     if (c.name == name) return c;
-  throw std::runtime_error("configuration " + name + " was not built");
+  throw std::runtime_error("configuration " + std::string(name) + " was not built");
 }
 
 struct Tiny {

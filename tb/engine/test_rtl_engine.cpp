@@ -22,8 +22,8 @@ namespace {
 constexpr int kSize = 128, kPlanes = 24;
 
 // Whole map through the RTL in tiles of the given size; every tile is compared with the model.
-Image<golden::MapCell> through_rtl(const std::string& name, const Scene& scene, int tile_cols, int tile_rows,
-                                   int threads, Scoreboard& board) {
+Image<golden::MapCell> through_rtl(const char* name, const Scene& scene, int tile_cols, int tile_rows, int threads,
+                                   Scoreboard& board) {
   const rtl::Configuration& c = configuration(name);
   SweepSetup setup{scene.rig, {kPlanes, 1.0, 4.0}, c.config, threshold_for(c.config, 0.85)};
   const Plan plan = plan_tiles(setup, tile_cols, tile_rows);
@@ -70,7 +70,7 @@ TEST_CASE("rtl engine: a rendered pair in tiles and in full-width bands is the m
 }
 
 TEST_CASE("rtl engine: extreme formats, random tiles") {
-  const std::string name = GENERATE("wide", "narrow", "odd");
+  const char* name = GENERATE("wide", "narrow", "odd");
   INFO("configuration " << name << " seed " << test_seed());
   const rtl::Configuration& c = configuration(name);
   StimulusMaker maker(c.config, test_seed());
