@@ -23,7 +23,8 @@ done
 
 # The paper's size and planes; its pictures are half as large on the page.
 build/psweep render --kind rocky --seed 2 --size 1120 -o "$work/full"
-build/psweep depth "$work/full/left.png" "$work/full/right.png" --calib "$work/full/calib.yaml" -o "$work/fixed" --cleanup
+build/psweep depth "$work/full/left.png" "$work/full/right.png" --calib "$work/full/calib.yaml" -o "$work/fixed" \
+  --cleanup
 build/psweep eval "$work/fixed" "$work/full/truth.pfm"
 cp "$work/full/left.png" docs/images/left.png
 cp "$work/fixed/depth.png" docs/images/depth.png
