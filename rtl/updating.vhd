@@ -179,7 +179,7 @@ begin
   u_map : entity work.ram_sdp
     generic map (
       G_DATA_W  => C_WORD_W,
-      G_DEPTH   => G_CELLS,
+      G_DEPTH   => imax(G_CELLS, 2), -- GHDL 2.0 cannot convert a RAM of one word
       G_LATENCY => 1
     )
     port map (
