@@ -161,14 +161,6 @@ architecture rtl of address_generator is
   signal out_inside_x  : std_logic;
   signal out_loaded_x  : std_logic;
 
-  function to_bit (b : boolean) return std_logic is
-  begin
-    if b then
-      return '1';
-    end if;
-    return '0';
-  end function to_bit;
-
   function floor_of (position : unsigned) return signed is
   begin
     return signed(position(31 downto C_POS_FRAC));

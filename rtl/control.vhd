@@ -209,14 +209,6 @@ architecture rtl of control is
   signal window_errors_q     : unsigned(15 downto 0);
   signal tile_clocks_q       : unsigned(31 downto 0);
 
-  function to_bit (b : boolean) return std_logic is
-  begin
-    if b then
-      return '1';
-    end if;
-    return '0';
-  end function to_bit;
-
   -- value + 1, all ones stay.
   function plus_1_saturated (value : unsigned(15 downto 0)) return unsigned is
   begin

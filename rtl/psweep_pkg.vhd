@@ -49,6 +49,9 @@ package psweep_pkg is
 
   function imax (a, b : integer) return integer;
 
+  -- true is '1'
+  function to_bit (b : boolean) return std_logic;
+
 end package psweep_pkg;
 
 package body psweep_pkg is
@@ -79,5 +82,13 @@ package body psweep_pkg is
     end if;
     return b;
   end function imax;
+
+  function to_bit (b : boolean) return std_logic is
+  begin
+    if b then
+      return '1';
+    end if;
+    return '0';
+  end function to_bit;
 
 end package body psweep_pkg;

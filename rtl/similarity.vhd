@@ -200,14 +200,6 @@ architecture rtl of similarity is
   signal s7_flags     : std_logic_vector(1 downto 0);
   signal s1_last_in   : std_logic_vector(1 downto 0);
 
-  function to_bit (b : boolean) return std_logic is
-  begin
-    if b then
-      return '1';
-    end if;
-    return '0';
-  end function to_bit;
-
   -- One usable flag more: the run goes on up to M, or breaks.
   function next_run (run : unsigned; usable : std_logic; restart : std_logic) return unsigned is
     variable v_run : unsigned(run'length - 1 downto 0);

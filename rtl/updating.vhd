@@ -147,14 +147,6 @@ architecture rtl of updating is
   signal beat_valid   : std_logic;
   signal beat         : std_logic_vector(C_DATA_W downto 0);
 
-  function to_bit (b : boolean) return std_logic is
-  begin
-    if b then
-      return '1';
-    end if;
-    return '0';
-  end function to_bit;
-
 begin
 
   assert G_CELLS >= 1 and G_CELLS <= 2 ** 22
