@@ -29,11 +29,14 @@ const Configuration* find_configuration(const golden::Config& need) {
 std::string build_command(const golden::Config& need) {
   auto even = [](int v) { return v + (v & 1); };
   std::ostringstream text;
+  // The name carries the formats as well: two requests must not replace each other's file.
   text << "make config NAME=w" << need.window << "_" << need.plane_cols << "x" << need.plane_rows << "_p" << need.planes
-       << " WINDOW=" << need.window << " PLANE_COLS=" << need.plane_cols << " PLANE_ROWS=" << need.plane_rows
-       << " IMG_COLS=" << even(need.img_cols) << " IMG_ROWS=" << even(need.img_rows) << " PLANES=" << need.planes
-       << " PIX_BITS=" << need.pix_bits << " WEIGHT_BITS=" << need.weight_bits << " INTERP_FRAC=" << need.interp_frac
-       << " MNCC_BITS=" << need.mncc_bits << " FRAC_BITS=" << need.frac_bits;
+       << "_" << need.pix_bits << "_" << need.weight_bits << "_" << need.interp_frac << "_" << need.mncc_bits << "_"
+       << need.frac_bits << " WINDOW=" << need.window << " PLANE_COLS=" << need.plane_cols
+       << " PLANE_ROWS=" << need.plane_rows << " IMG_COLS=" << even(need.img_cols)
+       << " IMG_ROWS=" << even(need.img_rows) << " PLANES=" << need.planes << " PIX_BITS=" << need.pix_bits
+       << " WEIGHT_BITS=" << need.weight_bits << " INTERP_FRAC=" << need.interp_frac << " MNCC_BITS=" << need.mncc_bits
+       << " FRAC_BITS=" << need.frac_bits;
   return text.str();
 }
 
