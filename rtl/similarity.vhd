@@ -89,7 +89,6 @@ architecture rtl of similarity is
   signal s1_wide        : std_logic;                                  -- i >= M
   signal s1_cell        : std_logic;                                  -- the window is complete
   signal s1_inside      : std_logic;
-  signal s1_fields      : std_logic_vector(4 downto 0);
 
   -- s2: the sample M rows above comes out of the delay
   signal s2_valid : std_logic;
@@ -193,12 +192,8 @@ architecture rtl of similarity is
   signal div_num      : std_logic_vector(C_NORM downto 0);
   signal div_quot     : std_logic_vector(G_MNCC_W - 1 downto 0);
   signal div_textured : std_logic_vector(0 downto 0);
-  signal flags_s4     : std_logic_vector(0 downto 0);
   signal flags_out    : std_logic_vector(1 downto 0);
-  signal flags_s12    : std_logic_vector(0 downto 0);
-  signal s6_flags     : std_logic_vector(0 downto 0);
   signal s7_flags     : std_logic_vector(1 downto 0);
-  signal s1_last_in   : std_logic_vector(1 downto 0);
 
   -- One usable flag more: the run goes on up to M, or breaks.
   function next_run (run : unsigned; usable : std_logic; restart : std_logic) return unsigned is
@@ -289,8 +284,6 @@ begin
   s1_inside <= to_bit(s1_run_x = G_WINDOW) and to_bit(s1_run_y = G_WINDOW);
 
   -- Bits that wait for the stage which needs them.
-  s1_fields  <= s1_plane_first & s1_wide & s1_row_first & s1_inside & s1_plane_last;
-  s1_last_in <= s1_inside & s1_plane_last;
 
   u_first : entity work.delay_line
     generic map (
@@ -298,10 +291,10 @@ begin
       G_DELAY  => 3
     )
     port map (
-      clk    => clk,
-      ce     => '1',
-      s_data => s1_fields(4 downto 4),
-      m_data => flags_s4
+      clk       => clk,
+      ce        => '1',
+      s_data(0) => s1_plane_first,
+      m_data(0) => s4_first
     );
 
   u_wide : entity work.delay_line
@@ -310,10 +303,10 @@ begin
       G_DELAY  => 5
     )
     port map (
-      clk    => clk,
-      ce     => '1',
-      s_data => s1_fields(3 downto 3),
-      m_data => s6_flags
+      clk       => clk,
+      ce        => '1',
+      s_data(0) => s1_wide,
+      m_data(0) => s6_wide
     );
 
   u_row_first : entity work.delay_line
@@ -335,10 +328,10 @@ begin
       G_DELAY  => 11
     )
     port map (
-      clk    => clk,
-      ce     => '1',
-      s_data => s1_fields(1 downto 1),
-      m_data => flags_s12
+      clk       => clk,
+      ce        => '1',
+      s_data(0) => s1_inside,
+      m_data(0) => s12_inside
     );
 
   u_out : entity work.delay_line
@@ -347,16 +340,14 @@ begin
       G_DELAY  => G_MNCC_W + 14
     )
     port map (
-      clk    => clk,
-      ce     => '1',
-      s_data => s1_last_in,
-      m_data => flags_out
+      clk       => clk,
+      ce        => '1',
+      s_data(1) => s1_inside,
+      s_data(0) => s1_plane_last,
+      m_data    => flags_out
     );
 
-  s4_first     <= flags_s4(0);
-  s6_wide      <= s6_flags(0);
   s7_row_first <= s7_flags(0);
-  s12_inside   <= flags_s12(0);
 
   -- s2: delay of M rows ----------------------------------------------------------------------------------------------
   -- A word is read one clock before it is replaced: the buffer holds exactly M rows.

@@ -8,6 +8,7 @@
 #include "Vaddress_generator_mid.h"
 #include "Vaddress_generator_min.h"
 #include "golden/address_generator.hpp"
+#include "golden/control.hpp"
 #include "golden/storage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -18,7 +19,7 @@ using namespace psweep::tb;
 
 namespace {
 
-constexpr uint64_t kLatency = 9;  // C_ADDRESS_LATENCY
+constexpr uint64_t kLatency = golden::kAddressLatency;
 
 // Low `bits` of a signed or unsigned value, as a port shows them.
 uint64_t bits_of(int64_t value, int bits) { return static_cast<uint64_t>(value) & ((uint64_t{1} << bits) - 1); }

@@ -9,6 +9,7 @@
 #include "Vinterpolation_3_1_8.h"
 #include "Vinterpolation_8_4_6.h"
 #include "Vinterpolation_8_8_2.h"
+#include "golden/control.hpp"
 #include "golden/interpolation.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -19,7 +20,7 @@ using namespace psweep::tb;
 
 namespace {
 
-constexpr uint64_t kLatency = 6;  // C_INTERPOLATION_LATENCY
+constexpr uint64_t kLatency = golden::kInterpolationLatency;
 
 template <class Dut>
 struct Bench : Agent {

@@ -8,6 +8,7 @@
 #include "Vsimilarity_21.h"
 #include "Vsimilarity_3.h"
 #include "Vsimilarity_5.h"
+#include "golden/control.hpp"
 #include "golden/similarity.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -114,7 +115,7 @@ struct Bench : Agent {
               inside = inside && ok[at];
             }
           const golden::Similarity s = golden::mncc(config, sums, inside);
-          const int latency_clocks = 16 + config.mncc_bits;  // similarity_latency()
+          const int latency_clocks = golden::similarity_latency(config);
           expected.push_back({s.v,
                               static_cast<uint64_t>(s.valid << 2 | s.textured << 1 | dut.s_plane_last),
                               sim.cycle() + static_cast<uint64_t>(latency_clocks),

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "Vstorage_mid.h"
+#include "golden/control.hpp"
 #include "golden/storage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -15,7 +16,7 @@ using namespace psweep::tb;
 
 namespace {
 
-constexpr uint64_t kLatency = 4;  // C_STORAGE_LATENCY
+constexpr uint64_t kLatency = golden::kStorageLatency;
 
 golden::Config mid_config() {
   golden::Config c;

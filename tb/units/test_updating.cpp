@@ -6,6 +6,7 @@
 
 #include "Vupdating_a.h"
 #include "Vupdating_b.h"
+#include "golden/control.hpp"
 #include "golden/updating.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -109,7 +110,7 @@ struct Bench : Agent {
         // V of a window outside must not matter.
         dut.s_v = static_cast<std::remove_reference_t<decltype(dut.s_v)>>(s.valid ? s.v : below(2));
         expected_words.push_back(map[n]);
-        expected_writes.emplace_back(sim.cycle() + static_cast<uint64_t>(4 + config.frac_bits),  // updating_latency()
+        expected_writes.emplace_back(sim.cycle() + static_cast<uint64_t>(golden::updating_latency(config)),
                                      Place{tile, k, n, 0});
         sim.tick();
         dut.s_valid = 0;
