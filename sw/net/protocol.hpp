@@ -92,13 +92,38 @@ enum Counter : int {
 };
 
 // Names of the counters in their order; nullptr behind the last.
-constexpr const char* kCounterNames[kCounterWords] = {
-    "rx_frames",       "rx_fcs",         "rx_align",   "rx_short",        "rx_long",        "rx_error",
-    "rx_filtered",     "rx_no_slot",     "rx_overflow", "rx_other",       "ip_header",      "ip_fragment",
-    "checksum",        "arp",            "icmp",       "udp",             "bad_message",    "foreign",
-    "tx_frames",       "tx_collisions",  "tx_late",    "tx_excessive",    "sessions",       "timeouts",
-    "engine_wait_rows", "engine_wait_map", "chunks_repeated", "chunks_refused", "map_packets", nullptr,
-    nullptr,           nullptr};
+constexpr const char* kCounterNames[kCounterWords] = {"rx_frames",
+                                                      "rx_fcs",
+                                                      "rx_align",
+                                                      "rx_short",
+                                                      "rx_long",
+                                                      "rx_error",
+                                                      "rx_filtered",
+                                                      "rx_no_slot",
+                                                      "rx_overflow",
+                                                      "rx_other",
+                                                      "ip_header",
+                                                      "ip_fragment",
+                                                      "checksum",
+                                                      "arp",
+                                                      "icmp",
+                                                      "udp",
+                                                      "bad_message",
+                                                      "foreign",
+                                                      "tx_frames",
+                                                      "tx_collisions",
+                                                      "tx_late",
+                                                      "tx_excessive",
+                                                      "sessions",
+                                                      "timeouts",
+                                                      "engine_wait_rows",
+                                                      "engine_wait_map",
+                                                      "chunks_repeated",
+                                                      "chunks_refused",
+                                                      "map_packets",
+                                                      nullptr,
+                                                      nullptr,
+                                                      nullptr};
 
 // Generics of the arbiter; sizes that follow from them and from the engine's.
 struct ArbiterConfig {
