@@ -12,3 +12,8 @@ divider.vhd
 similarity.vhd
 updating.vhd
 psweep.vhd
+cdc_sync.vhd
+reset_sync.vhd
+ram_dc.vhd
+async_fifo.vhd
+responder.vhd

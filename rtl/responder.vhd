@@ -1,0 +1,927 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- responder: what the chip does with a message: ARP and ICMP echo replies, the session, and the protocol over UDP.
+--   Protocol  : docs/protocol.md, sw/net/protocol.hpp
+--   Structure : one message at a time, bytes in order, no CPU. The waiting frame is read from packet_rx's RAM byte by
+--               byte through one 32-bit shift register (word): first the header (bytes 42 to 57), then the arguments.
+--               Rows go on to the row buffer as they pass, one byte a clock. The reply leaves through the same register:
+--               its header is the request's, read again, but for four bytes; its body is loaded word by word.
+--               A message is obeyed only after packet_rx has found the whole frame good, so nothing has to be undone
+--   Map       : between messages, chunk after chunk of the READ in force, as they become available
+--   Rate      : rows and cells one byte a clock; replies one byte in 6 clocks (at 60 MHz a status in 6 us)
+--   Session   : one token; silence of G_SESSION_MS aborts all and ends it
+--   Counters  : events(n) is counter n of the protocol
+--   Reset     : no session, no READ, duplex by pin
+--   Golden    : sw/golden/arbiter.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity responder is
+  generic (
+    G_IMG_COLS    : integer := 340;
+    G_IMG_ROWS    : integer := 144;
+    G_PLANE_COLS  : integer := 256;
+    G_PLANE_ROWS  : integer := 130;
+    G_PLANES      : integer := 301;
+    G_WINDOW      : integer := 13;
+    G_PIX_W       : integer := 8;
+    G_WEIGHT_W    : integer := 8;
+    G_INTERP_F    : integer := 2;
+    G_MNCC_W      : integer := 13;
+    G_FRAC_W      : integer := 8;
+    G_LANES       : integer := 1;
+    G_CLK_KHZ     : integer := 166000; -- 1000 .. 1000000
+    G_CHUNK_BYTES : integer := 1408;   -- 16 .. 1440
+    G_ROW_SLOTS   : integer := 70;     -- 2 .. 1024
+    G_MAP_DEPTH   : integer := 33280;  -- only told to the host
+    G_RX_SLOTS    : integer := 2;      -- likewise
+    G_SESSION_MS  : integer := 10000   -- 1 .. 65535
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    own_mac         : in  std_logic_vector(47 downto 0);
+    pin_full_duplex : in  std_logic;
+    pin_speed_100   : in  std_logic;
+    full_duplex     : out std_logic;
+    session         : out std_logic;
+    events          : out std_logic_vector(31 downto 0);
+
+    -- packet_rx
+    m_valid  : in  std_logic;
+    m_kind   : in  std_logic_vector(1 downto 0);
+    m_length : in  std_logic_vector(10 downto 0);
+    m_done   : out std_logic;
+    r_addr   : out std_logic_vector(10 downto 0);
+    r_data   : in  std_logic_vector(7 downto 0);
+
+    -- packet_tx
+    s_ready    : in  std_logic;
+    s_start    : out std_logic;
+    s_kind     : out std_logic_vector(1 downto 0);
+    s_bank     : out std_logic;
+    p_valid    : out std_logic;
+    p_ready    : in  std_logic;
+    p_data     : out std_logic_vector(7 downto 0);
+    p_last     : out std_logic;
+    peer_we    : out std_logic;
+    peer_bank  : out std_logic;
+    peer_index : out std_logic_vector(3 downto 0);
+    peer_data  : out std_logic_vector(7 downto 0);
+
+    -- row_buffer
+    row_clear    : out std_logic;
+    row_open     : out std_logic;
+    row_pixels   : out std_logic_vector(23 downto 0);
+    row_chunks   : out std_logic_vector(15 downto 0);
+    row_busy     : in  std_logic;
+    row_base     : in  std_logic_vector(15 downto 0);
+    row_received : in  std_logic_vector(15 downto 0);
+    w_check      : out std_logic;
+    w_chunk      : out std_logic_vector(15 downto 0);
+    w_new        : in  std_logic;
+    w_repeated   : in  std_logic;
+    w_valid      : out std_logic;
+    w_data       : out std_logic_vector(7 downto 0);
+    w_commit     : out std_logic;
+    b_index      : out std_logic_vector(9 downto 0);
+    b_bit        : in  std_logic;
+
+    -- map_buffer
+    map_release  : out std_logic;
+    map_clear    : out std_logic;
+    map_keep     : out std_logic_vector(15 downto 0);
+    map_started  : in  std_logic;
+    map_busy     : in  std_logic;
+    map_complete : in  std_logic;
+    map_count    : in  std_logic_vector(23 downto 0);
+    f_chunk      : out std_logic_vector(15 downto 0);
+    f_ready      : in  std_logic;
+    f_start      : out std_logic;
+    f_valid      : in  std_logic;
+    f_take       : out std_logic;
+    f_data       : in  std_logic_vector(7 downto 0);
+    f_last       : in  std_logic;
+
+    -- counters
+    c_index : out std_logic_vector(4 downto 0);
+    c_valid : in  std_logic;
+    c_data  : in  std_logic_vector(31 downto 0);
+
+    -- scheduler
+    job_we      : out std_logic;
+    job_addr    : out std_logic_vector(4 downto 0);
+    job_data    : out std_logic_vector(31 downto 0);
+    t_valid     : out std_logic;
+    t_address   : out std_logic_vector(15 downto 0);
+    t_data      : out std_logic_vector(31 downto 0);
+    staged      : in  std_logic; -- a tile is in the row buffer and not launched
+    tile        : out std_logic_vector(15 downto 0);
+    stop        : out std_logic;
+    running     : in  std_logic;
+    run_tile    : in  std_logic_vector(15 downto 0);
+    failed      : in  std_logic;
+    failed_tile : in  std_logic_vector(15 downto 0);
+
+    -- engine
+    engine_state  : in  std_logic_vector(2 downto 0);
+    engine_wait   : in  std_logic; -- it has a cell that nobody takes
+    errors        : in  std_logic_vector(7 downto 0);
+    error_count   : in  std_logic_vector(15 downto 0);
+    tiles_done    : in  std_logic_vector(15 downto 0);
+    tiles_dropped : in  std_logic_vector(15 downto 0);
+    window_errors : in  std_logic_vector(15 downto 0);
+    tile_clocks   : in  std_logic_vector(31 downto 0)
+  );
+end entity responder;
+
+architecture rtl of responder is
+
+  -- Message types and codes.
+  constant C_OPEN     : std_logic_vector(7 downto 0) := x"01";
+  constant C_CLOSE    : std_logic_vector(7 downto 0) := x"02";
+  constant C_INFO     : std_logic_vector(7 downto 0) := x"03";
+  constant C_COUNTERS : std_logic_vector(7 downto 0) := x"04";
+  constant C_STATUS   : std_logic_vector(7 downto 0) := x"05";
+  constant C_TABLE    : std_logic_vector(7 downto 0) := x"06";
+  constant C_START    : std_logic_vector(7 downto 0) := x"07";
+  constant C_WRITE    : std_logic_vector(7 downto 0) := x"08";
+  constant C_READ     : std_logic_vector(7 downto 0) := x"09";
+  constant C_RELEASE  : std_logic_vector(7 downto 0) := x"0a";
+  constant C_SET      : std_logic_vector(7 downto 0) := x"0b";
+
+  constant C_OK          : std_logic_vector(2 downto 0) := "000";
+  constant C_BUSY        : std_logic_vector(2 downto 0) := "001";
+  constant C_NO_SESSION  : std_logic_vector(2 downto 0) := "010";
+  constant C_BAD_MESSAGE : std_logic_vector(2 downto 0) := "011";
+  constant C_ORDER       : std_logic_vector(2 downto 0) := "100";
+  constant C_NOT_READY   : std_logic_vector(2 downto 0) := "101";
+
+  constant C_KIND_ARP  : std_logic_vector(1 downto 0) := "00";
+  constant C_KIND_ICMP : std_logic_vector(1 downto 0) := "01";
+  constant C_KIND_UDP  : std_logic_vector(1 downto 0) := "10";
+
+  -- Sizes that follow from the generics.
+  constant C_PAIR_BYTES  : integer := (2 * G_PIX_W + 7) / 8;
+  constant C_CHUNK_PAIRS : integer := G_CHUNK_BYTES / C_PAIR_BYTES;
+  constant C_WRITE_BYTES : integer := C_CHUNK_PAIRS * C_PAIR_BYTES;
+  constant C_CELL_W      : integer := 1 + clog2(G_PLANES) + G_FRAC_W + G_MNCC_W;
+  constant C_CELL_BYTES  : integer := (C_CELL_W + 7) / 8;
+  constant C_MAP_WORDS   : integer := (G_ROW_SLOTS + 31) / 32; -- of the bitmap
+  constant C_HEADER      : integer := 42;                      -- first byte of the message in the frame
+  constant C_ARGUMENTS   : integer := C_HEADER + 16;
+  constant C_STATUS_END  : integer := 4 + 9 + C_MAP_WORDS - 1; -- last word of a reply, its header being 0 to 3
+  constant C_TABLE_END   : integer := 4 + 32 - 1;
+  constant C_OUT_W       : integer := clog2(imax(C_STATUS_END, C_TABLE_END) + 1);
+
+  -- Capabilities. Words 14 and 15 are the address, which depends on pins.
+  type t_words is array (31 downto 0) of std_logic_vector(31 downto 0);
+  function info_words return t_words is
+    variable v_words : t_words;
+  begin
+    v_words     := (others => (others => '0'));
+    v_words(0)  := std_logic_vector(to_unsigned(1, 16)) & std_logic_vector(to_unsigned(32, 16));
+    v_words(1)  := std_logic_vector(to_unsigned(G_IMG_COLS, 32));
+    v_words(2)  := std_logic_vector(to_unsigned(G_IMG_ROWS, 32));
+    v_words(3)  := std_logic_vector(to_unsigned(G_PLANE_COLS, 32));
+    v_words(4)  := std_logic_vector(to_unsigned(G_PLANE_ROWS, 32));
+    v_words(5)  := std_logic_vector(to_unsigned(G_PLANES, 32));
+    v_words(6)  := std_logic_vector(to_unsigned(G_WINDOW, 32));
+    v_words(7)  := std_logic_vector(to_unsigned(G_PIX_W, 32));
+    v_words(8)  := std_logic_vector(to_unsigned(G_WEIGHT_W, 32));
+    v_words(9)  := std_logic_vector(to_unsigned(G_INTERP_F, 32));
+    v_words(10) := std_logic_vector(to_unsigned(G_MNCC_W, 32));
+    v_words(11) := std_logic_vector(to_unsigned(G_FRAC_W, 32));
+    v_words(12) := std_logic_vector(to_unsigned(G_LANES, 32));
+    v_words(13) := std_logic_vector(to_unsigned(C_CELL_W, 32));
+    v_words(16) := std_logic_vector(to_unsigned(G_CLK_KHZ, 32));
+    v_words(17) := std_logic_vector(to_unsigned(G_CHUNK_BYTES, 32));
+    v_words(18) := std_logic_vector(to_unsigned(C_PAIR_BYTES, 32));
+    v_words(19) := std_logic_vector(to_unsigned(C_CHUNK_PAIRS, 32));
+    v_words(20) := std_logic_vector(to_unsigned(G_ROW_SLOTS, 32));
+    v_words(21) := std_logic_vector(to_unsigned(C_CELL_BYTES, 32));
+    v_words(22) := std_logic_vector(to_unsigned(G_CHUNK_BYTES / C_CELL_BYTES, 32));
+    v_words(23) := std_logic_vector(to_unsigned(G_MAP_DEPTH, 32));
+    v_words(24) := std_logic_vector(to_unsigned(G_SESSION_MS, 32));
+    v_words(25) := std_logic_vector(to_unsigned(G_RX_SLOTS, 32));
+    v_words(26) := std_logic_vector(to_unsigned(32, 32));
+    return v_words;
+  end function info_words;
+  constant C_INFO_WORDS : t_words := info_words;
+
+  type t_state is (
+    st_idle,   -- the next message, or the next chunk of the map
+    st_header, -- bytes 42 to 57 pass
+    st_decide, -- word = tile and index
+    st_words,  -- arguments pass
+    st_check,  -- the row buffer looks at the chunk
+    st_rows,   -- pixels pass
+    st_wait,   -- for packet_tx
+    st_peer,   -- the sender's addresses go to packet_tx
+    st_fetch,  -- one byte of the reply: address out ..
+    st_show,   -- .. and byte to packet_tx
+    st_cells,  -- bytes of the map to packet_tx
+    st_done,   -- the frame's slot is free
+    st_abort   -- engine, buffers and session
+  );
+  signal state : t_state;
+
+  -- Reading the frame: byte hpos is on r_data while have = '1'.
+  signal pos       : unsigned(10 downto 0);
+  signal have      : std_logic;
+  signal hpos      : unsigned(10 downto 0);
+  signal scanning  : std_logic;
+  signal word      : std_logic_vector(31 downto 0);
+  signal word_next : std_logic_vector(31 downto 0); -- with the byte that is passing
+  signal word_full : std_logic;                     -- that byte is the last of a word
+  signal count     : unsigned(4 downto 0);          -- words of arguments so far, all ones stay
+
+  -- The message.
+  signal msg_type   : std_logic_vector(7 downto 0);
+  signal magic_ok   : std_logic;
+  signal version_ok : std_logic;
+  signal token_ok   : std_logic;
+  signal answer     : std_logic;
+  signal code       : std_logic_vector(2 downto 0);
+  signal silent     : std_logic; -- no reply
+  signal end_pos    : unsigned(10 downto 0); -- frame byte behind the message
+  signal words_end  : unsigned(10 downto 0); -- last byte of the arguments
+  signal index      : unsigned(15 downto 0); -- chunk or table word
+  signal long_1     : std_logic; -- at least one word of arguments
+  signal long_start : std_logic;
+  signal long_write : std_logic; -- exactly a chunk of rows
+
+  -- Session.
+  signal open_q      : std_logic;
+  signal token       : std_logic_vector(31 downto 0);
+  signal nonce       : std_logic_vector(31 downto 0);
+  signal dice        : std_logic_vector(31 downto 0); -- next token, never 0
+  signal last_tile   : unsigned(15 downto 0);         -- latest START
+  signal map_tile    : unsigned(15 downto 0);
+  signal table_id    : unsigned(15 downto 0);
+  signal table_words : unsigned(13 downto 0);
+  signal duplex_mode : std_logic_vector(1 downto 0);
+  signal pixels      : std_logic_vector(23 downto 0);
+  signal chunks      : std_logic_vector(15 downto 0);
+  signal close_q     : std_logic; -- st_abort ends the session, else it begins one
+  signal by_timer    : std_logic; -- nobody waits for an answer
+  signal is_next     : std_logic; -- word: tile is last_tile + 1
+  signal is_last     : std_logic;
+  signal idle_chip   : std_logic; -- no tile anywhere but in the map buffer
+
+  -- The READ in force.
+  signal read_active : std_logic;
+  signal read_tile   : unsigned(15 downto 0);
+  signal read_next   : unsigned(15 downto 0);
+  signal read_left   : unsigned(15 downto 0);
+  signal read_seq    : std_logic_vector(15 downto 0);
+  signal keep        : std_logic_vector(15 downto 0);
+  signal settle      : std_logic_vector(3 downto 0); -- f_ready may be that of an earlier question
+  signal map_go      : std_logic;
+
+  -- The reply.
+  signal is_map     : std_logic;
+  signal is_icmp    : std_logic;
+  signal use_bank_1 : std_logic;
+  signal out_word   : unsigned(C_OUT_W - 1 downto 0);
+  signal out_byte   : unsigned(1 downto 0);
+  signal out_end    : unsigned(C_OUT_W - 1 downto 0);
+  signal step       : unsigned(5 downto 0); -- of st_fetch
+  signal in_header  : std_logic;
+  signal in_bitmap  : std_logic;
+  signal fetched    : std_logic;
+  signal body_word  : std_logic_vector(31 downto 0);
+  signal body_index : unsigned(4 downto 0); -- of a word in INFO and COUNTERS
+  signal head_byte  : std_logic_vector(7 downto 0);
+  signal status     : std_logic_vector(15 downto 0);
+  signal at_end     : std_logic;
+
+  -- Time.
+  signal ms_clock   : unsigned(clog2(G_CLK_KHZ) - 1 downto 0);
+  signal ms_tick    : std_logic;
+  signal quiet_ms   : unsigned(15 downto 0); -- left until the session ends
+  signal expired    : std_logic;
+  signal rows_wait  : unsigned(7 downto 0);
+  signal map_wait   : unsigned(7 downto 0);
+  signal rows_short : std_logic;
+
+begin
+
+  assert G_CLK_KHZ >= 1000 and G_CLK_KHZ <= 1000000
+    report "responder: G_CLK_KHZ=" & integer'image(G_CLK_KHZ) & " outside 1000..1000000"
+    severity failure;
+  assert G_CHUNK_BYTES >= 16 and G_CHUNK_BYTES <= 1440
+    report "responder: G_CHUNK_BYTES=" & integer'image(G_CHUNK_BYTES) & " outside 16..1440"
+    severity failure;
+  assert G_ROW_SLOTS >= 2 and G_ROW_SLOTS <= 1024
+    report "responder: G_ROW_SLOTS=" & integer'image(G_ROW_SLOTS) & " outside 2..1024"
+    severity failure;
+  assert G_SESSION_MS >= 1 and G_SESSION_MS <= 65535
+    report "responder: G_SESSION_MS=" & integer'image(G_SESSION_MS) & " outside 1..65535"
+    severity failure;
+
+  -- Reading ----------------------------------------------------------------------------------------------------------
+  scanning  <= to_bit(state = st_header or state = st_words or state = st_rows or state = st_peer);
+  r_addr    <= std_logic_vector(pos);
+  word_next <= word(23 downto 0) & r_data;
+  word_full <= have and to_bit(hpos(1 downto 0) = 1); -- words begin at byte 42, 46, .., 58, ..
+
+  long_1     <= to_bit(end_pos >= C_ARGUMENTS + 4);
+  long_start <= to_bit(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
+  long_write <= to_bit(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
+
+  is_next   <= to_bit(unsigned(word(31 downto 16)) = last_tile + 1);
+  is_last   <= to_bit(unsigned(word(31 downto 16)) = last_tile);
+  idle_chip <= not row_busy and not staged and not running and to_bit(engine_state = C_STATE_IDLE);
+
+  w_valid    <= have and to_bit(state = st_rows);
+  w_data     <= r_data;
+  w_chunk    <= std_logic_vector(index);
+  job_addr   <= std_logic_vector(count + 29); -- the first three words are no registers
+  job_data   <= word_next;
+  job_we     <= word_full and to_bit(state = st_words and msg_type = C_START and count >= 3);
+  t_valid    <= word_full and to_bit(state = st_words and msg_type = C_TABLE);
+  t_address  <= '1' & std_logic_vector(index(14 downto 0));
+  t_data     <= word_next;
+  row_pixels <= pixels;
+  row_chunks <= chunks;
+  tile       <= std_logic_vector(last_tile);
+
+  peer_data  <= r_data;
+  peer_bank  <= use_bank_1;
+
+  p_peer : process (hpos, have, state, m_kind)
+  begin
+    -- Sender's MAC, IP and port: bytes 6-11, 26-29 (ARP 28-31), 34-35 of the frame; places 0-5, 6-9, 10-11.
+    peer_we    <= '0';
+    peer_index <= std_logic_vector(hpos(3 downto 0) - 6);
+    if hpos >= 6 and hpos < 12 then
+      peer_we <= have and to_bit(state = st_peer);
+    elsif m_kind = C_KIND_ARP then
+      peer_index <= std_logic_vector(hpos(3 downto 0) - 6);       -- 28 becomes 6, mod 16
+      peer_we    <= have and to_bit(state = st_peer and hpos >= 28 and hpos < 32);
+    else
+      peer_index <= std_logic_vector(hpos(3 downto 0) - 4);       -- 26 becomes 6, mod 16
+      peer_we    <= have and to_bit(state = st_peer and hpos >= 26 and hpos < 30);
+      if hpos >= 34 then
+        peer_index <= std_logic_vector(hpos(3 downto 0) + 8);     -- 34 becomes 10, mod 16
+        peer_we    <= have and to_bit(state = st_peer);
+      end if;
+    end if;
+  end process p_peer;
+
+  -- Map --------------------------------------------------------------------------------------------------------------
+  f_chunk  <= std_logic_vector(read_next);
+  map_keep <= keep;
+  map_go   <= read_active and map_busy and f_ready and s_ready and not settle(0)
+              and to_bit(read_tile = map_tile);
+  f_take   <= p_ready and to_bit(state = st_cells);
+
+  -- Reply ------------------------------------------------------------------------------------------------------------
+  s_kind    <= C_KIND_UDP when is_map = '1' else m_kind;
+  s_bank    <= use_bank_1;
+  in_header <= to_bit(out_word < 4);
+  in_bitmap <= to_bit(out_word >= 13) and to_bit(msg_type /= C_INFO and msg_type /= C_COUNTERS);
+  at_end    <= to_bit(out_word = out_end and out_byte = 3);
+  body_index <= out_word(4 downto 0) - 4;
+  c_index   <= std_logic_vector(body_index);
+  b_index   <= std_logic_vector(resize(out_word - 13, 5)) & std_logic_vector(step(4 downto 0));
+
+  status <= "00000" & engine_state & pin_speed_100 & (duplex_mode(1) or (pin_full_duplex and not duplex_mode(0)))
+            & failed & map_complete & map_busy & running & row_busy & open_q;
+
+  p_body : process (is_map, in_header, out_word, body_index, token, read_seq, read_tile, read_next, msg_type, c_data,
+                    own_mac, last_tile, status, run_tile, map_tile, row_base, row_received, table_id, table_words,
+                    map_count, errors, error_count, tiles_done, tiles_dropped, tile_clocks, window_errors, failed_tile)
+  begin
+    if is_map = '1' then
+      if out_word = 0 then
+        body_word <= x"5053018c";
+      elsif out_word = 1 then
+        body_word <= token;
+      elsif out_word = 2 then
+        body_word <= read_seq & x"0000";
+      else
+        body_word <= std_logic_vector(read_tile) & std_logic_vector(read_next);
+      end if;
+    elsif in_header = '1' then
+      body_word <= token; -- only OPEN takes anything from here
+    elsif msg_type = C_COUNTERS then
+      body_word <= c_data;
+    elsif msg_type = C_INFO then
+      if out_word = 18 then
+        body_word <= x"0000" & own_mac(47 downto 32);
+      elsif out_word = 19 then
+        body_word <= own_mac(31 downto 0);
+      else
+        body_word <= C_INFO_WORDS(to_integer(body_index));
+      end if;
+    elsif out_word = 4 then
+      body_word <= std_logic_vector(last_tile) & status;
+    elsif out_word = 5 then
+      body_word <= run_tile & std_logic_vector(map_tile);
+    elsif out_word = 6 then
+      body_word <= row_base & row_received;
+    elsif out_word = 7 then
+      body_word <= std_logic_vector(table_id) & "00" & std_logic_vector(table_words);
+    elsif out_word = 8 then
+      body_word <= x"00" & map_count;
+    elsif out_word = 9 then
+      body_word <= x"00" & errors & error_count;
+    elsif out_word = 10 then
+      body_word <= tiles_done & tiles_dropped;
+    elsif out_word = 11 then
+      body_word <= tile_clocks;
+    else
+      body_word <= window_errors & failed_tile;
+    end if;
+  end process p_body;
+
+  -- Header of a reply: the request's bytes, but version, type, code and a zero (and OPEN's token).
+  p_head : process (out_word, out_byte, r_data, msg_type, code, word)
+  begin
+    head_byte <= r_data;
+    if out_word = 0 and out_byte = 2 then
+      head_byte <= x"01";
+    elsif out_word = 0 and out_byte = 3 then
+      head_byte <= msg_type or x"80";
+    elsif out_word = 1 and msg_type = C_OPEN and code = C_OK then
+      head_byte <= word(31 downto 24);
+    elsif out_word = 2 and out_byte = 2 then
+      head_byte <= "00000" & code;
+    elsif out_word = 2 and out_byte = 3 then
+      head_byte <= x"00";
+    end if;
+  end process p_head;
+
+  p_valid <= f_valid when state = st_cells else to_bit(state = st_show);
+  p_last  <= f_last when state = st_cells else at_end and not is_map;
+  p_data  <= f_data when state = st_cells
+             else r_data when is_icmp = '1'
+             else head_byte when in_header = '1' and is_map = '0'
+             else word(31 downto 24);
+
+  -- A word is loaded with its first byte, three clocks after its number (when a counter may take longer), or bit by bit.
+  fetched   <= to_bit(step = 33) when in_bitmap = '1' and out_byte = 0 and is_map = '0' and is_icmp = '0'
+               else to_bit(step >= 3) and (c_valid or in_header or to_bit(msg_type /= C_COUNTERS) or is_map or is_icmp);
+
+  -- The one process of the sequence ----------------------------------------------------------------------------------
+  p_sequence : process (clk)
+    variable v_go : std_logic;
+  begin
+    if rising_edge(clk) then
+      s_start     <= '0';
+      m_done      <= '0';
+      row_clear   <= '0';
+      row_open    <= '0';
+      w_check     <= '0';
+      w_commit    <= '0';
+      map_release <= '0';
+      map_clear   <= '0';
+      f_start     <= '0';
+      stop        <= '0';
+      events(16)  <= '0';
+      events(17)  <= '0';
+      events(22)  <= '0';
+      events(23)  <= '0';
+      events(26)  <= '0';
+      events(27)  <= '0';
+      events(28)  <= '0';
+
+      have <= scanning;
+      hpos <= pos;
+      if scanning = '1' then
+        pos <= pos + 1;
+      end if;
+      settle <= '0' & settle(3 downto 1);
+      if map_started = '1' then
+        map_tile <= unsigned(run_tile);
+        keep     <= (others => '0');
+        settle   <= (others => '1');
+      end if;
+      if ms_tick = '1' and expired = '0' then
+        quiet_ms <= quiet_ms - 1;
+      end if;
+
+      -- The shift register, both ways.
+      if have = '1' then
+        word <= word_next;
+      elsif state = st_fetch and in_bitmap = '1' and is_map = '0' and out_byte = 0 then
+        word <= word(30 downto 0) & b_bit; -- the first ones fall out again
+      elsif state = st_fetch and out_byte = 0 and fetched = '1' then
+        word <= body_word;
+      elsif state = st_show and p_ready = '1' then
+        word <= word(23 downto 0) & x"00";
+      end if;
+
+      if state = st_idle then
+        is_map     <= '0';
+        is_icmp    <= '0';
+        use_bank_1 <= '0';
+        silent     <= '0';
+        by_timer   <= '0';
+        code       <= C_OK;
+        count      <= (others => '0');
+        out_word   <= (others => '0');
+        out_byte   <= (others => '0');
+        out_end    <= to_unsigned(C_STATUS_END, C_OUT_W);
+        step       <= (others => '0');
+        have       <= '0';
+        pos        <= to_unsigned(C_HEADER, 11);
+        end_pos    <= unsigned(m_length) + C_HEADER;
+        if open_q = '1' and expired = '1' then
+          events(23) <= '1';
+          close_q    <= '1';
+          by_timer   <= '1';
+          state      <= st_abort;
+        elsif m_valid = '1' then
+          if m_kind = C_KIND_UDP then
+            state <= st_header;
+          else
+            is_icmp <= to_bit(m_kind = C_KIND_ICMP);
+            state   <= st_wait;
+          end if;
+        elsif map_go = '1' then
+          is_map     <= '1';
+          use_bank_1 <= '1';
+          f_start    <= '1';
+          s_start    <= '1';
+          events(28) <= '1';
+          state      <= st_fetch;
+        end if;
+
+      elsif state = st_header then
+        if have = '1' then
+          if hpos = C_HEADER + 3 then
+            msg_type   <= r_data;
+            magic_ok   <= to_bit(word_next(31 downto 16) = x"5053");
+            version_ok <= to_bit(word_next(15 downto 8) = x"01");
+          elsif hpos = C_HEADER + 7 then
+            token_ok <= open_q and to_bit(word_next = token);
+          elsif hpos = C_HEADER + 9 then
+            if msg_type = C_READ and token_ok = '1' then
+              read_seq <= word_next(15 downto 0);
+            end if;
+          elsif hpos = C_HEADER + 10 then
+            answer <= r_data(0);
+          elsif hpos = C_HEADER + 15 then
+            have  <= '0';
+            state <= st_decide;
+          end if;
+        end if;
+
+      elsif state = st_decide then
+        index     <= unsigned(word(15 downto 0));
+        pos       <= to_unsigned(C_ARGUMENTS, 11);
+        words_end <= to_unsigned(C_ARGUMENTS + 3, 11);
+        state     <= st_wait;
+        v_go      := '0';
+        if magic_ok = '0' or end_pos < C_ARGUMENTS then
+          events(16) <= '1';
+          silent     <= '1';
+          state      <= st_done;
+        elsif version_ok = '0' or msg_type = x"00" or unsigned(msg_type) > unsigned(C_SET) then
+          events(16) <= '1';
+          code       <= C_BAD_MESSAGE;
+        elsif msg_type = C_INFO or msg_type = C_COUNTERS then
+          out_end <= to_unsigned(C_TABLE_END, C_OUT_W);
+        elsif msg_type = C_OPEN then
+          v_go := '1';
+        elsif open_q = '0' then
+          if msg_type /= C_CLOSE then
+            code <= C_NO_SESSION;
+          end if;
+        elsif token_ok = '0' then
+          events(17) <= '1';
+          code       <= C_BUSY;
+        else
+          v_go     := '1';
+          quiet_ms <= to_unsigned(G_SESSION_MS, 16);
+        end if;
+        if v_go = '1' then
+          if msg_type = C_CLOSE then
+            close_q <= '1';
+            state   <= st_abort;
+          elsif msg_type = C_OPEN or msg_type = C_READ or msg_type = C_SET then
+            if long_1 = '1' then
+              state <= st_words;
+            else
+              events(16) <= '1';
+              code       <= C_BAD_MESSAGE;
+            end if;
+            if msg_type = C_READ and long_1 = '1' then
+              read_active <= '0';
+              read_tile   <= unsigned(word(31 downto 16));
+              read_next   <= unsigned(word(15 downto 0));
+              use_bank_1  <= '1';
+            end if;
+          elsif msg_type = C_TABLE then
+            words_end <= end_pos - 1;
+            -- Frame byte 42 is 2 mod 4.
+            if long_1 = '0' or end_pos(1 downto 0) /= 2 then
+              events(16) <= '1';
+              code       <= C_BAD_MESSAGE;
+            elsif unsigned(word(31 downto 16)) = table_id then
+              if unsigned(word(15 downto 0)) > table_words or table_id = 0 then
+                code <= C_ORDER;
+              elsif idle_chip = '0' then
+                code <= C_NOT_READY;
+              else
+                state <= st_words;
+              end if;
+            elsif unsigned(word(31 downto 16)) = table_id + 1 and unsigned(word(15 downto 0)) = 0 then
+              if idle_chip = '0' then
+                code <= C_NOT_READY;
+              else
+                table_words <= (others => '0');
+                table_id    <= table_id + 1;
+                state       <= st_words;
+              end if;
+            else
+              code <= C_ORDER;
+            end if;
+          elsif msg_type = C_START then
+            words_end <= to_unsigned(C_ARGUMENTS + 12 + 4 * 18 - 1, 11);
+            if long_start = '0' then
+              events(16) <= '1';
+              code       <= C_BAD_MESSAGE;
+            elsif is_next = '1' then
+              if row_busy = '1' or staged = '1' then
+                code <= C_NOT_READY;
+              else
+                state <= st_words;
+              end if;
+            elsif is_last = '0' then
+              code <= C_ORDER;
+            end if;
+          elsif msg_type = C_WRITE then
+            silent <= not answer;
+            if long_write = '0' then
+              events(16) <= '1';
+              code       <= C_BAD_MESSAGE;
+            elsif is_last = '0' then
+              code <= C_ORDER;
+            elsif row_busy = '1' then
+              w_check <= '1';
+              state   <= st_check;
+            end if;
+          elsif msg_type = C_RELEASE then
+            if unsigned(word(31 downto 16)) /= map_tile then
+              code <= C_ORDER;
+            elsif map_busy = '1' and map_complete = '0' then
+              code <= C_NOT_READY;
+            else
+              map_release <= '1';
+            end if;
+          end if;
+        end if;
+
+      elsif state = st_words then
+        if word_full = '1' then
+          if count /= 31 then
+            count <= count + 1;
+          end if;
+          if hpos = words_end then
+            have  <= '0';
+            state <= st_wait;
+          end if;
+          if msg_type = C_OPEN then
+            nonce <= word_next;
+            if open_q = '0' then
+              token    <= dice;
+              close_q  <= '0';
+              state    <= st_abort;
+            elsif word_next /= nonce then
+              nonce      <= nonce;
+              events(17) <= '1';
+              code       <= C_BUSY;
+            else
+              quiet_ms <= to_unsigned(G_SESSION_MS, 16);
+            end if;
+          elsif msg_type = C_READ then
+            read_left   <= unsigned(word_next(31 downto 16));
+            read_active <= to_bit(unsigned(word_next(31 downto 16)) /= 0);
+            settle      <= (others => '1');
+            if read_tile = map_tile then
+              keep <= word_next(15 downto 0);
+            end if;
+          elsif msg_type = C_SET then
+            if index = 0 and unsigned(word_next(31 downto 2)) = 0 and word_next(1 downto 0) /= "11" then
+              duplex_mode <= word_next(1 downto 0);
+            else
+              events(16) <= '1';
+              code       <= C_BAD_MESSAGE;
+            end if;
+          elsif msg_type = C_TABLE then
+            index <= index + 1;
+            if index = table_words and table_words(13) = '0' then
+              table_words <= table_words + 1;
+            end if;
+          else
+            -- START: the table it needs, pixels, chunks, registers (the fifth of them is PLANES).
+            if count = 0 and unsigned(word_next(31 downto 16)) /= table_id then
+              code  <= C_ORDER;
+              have  <= '0';
+              state <= st_wait;
+            elsif (count = 1 and (unsigned(word_next) = 0 or unsigned(word_next(31 downto 24)) /= 0))
+                  or (count = 2 and (unsigned(word_next) = 0 or unsigned(word_next(31 downto 16)) /= 0)) then
+              events(16) <= '1';
+              code       <= C_BAD_MESSAGE;
+              have       <= '0';
+              state      <= st_wait;
+            elsif count = 7 and unsigned(word_next(10 downto 0)) > table_words(13 downto 3) then
+              code  <= C_ORDER;
+              have  <= '0';
+              state <= st_wait;
+            elsif hpos = words_end then
+              row_open  <= '1';
+              last_tile <= last_tile + 1;
+            end if;
+            if count = 1 then
+              pixels <= word_next(23 downto 0);
+            elsif count = 2 then
+              chunks <= word_next(15 downto 0);
+            end if;
+          end if;
+        end if;
+
+      elsif state = st_check then
+        -- Three clocks after w_check.
+        step <= step + 1;
+        if step = 3 then
+          step <= (others => '0');
+          if w_new = '1' then
+            state <= st_rows;
+          else
+            state      <= st_wait;
+            events(26) <= w_repeated;
+            events(27) <= not w_repeated;
+            if w_repeated = '0' then
+              code <= C_NOT_READY;
+            end if;
+          end if;
+        end if;
+
+      elsif state = st_rows then
+        if have = '1' and hpos = C_ARGUMENTS + C_WRITE_BYTES - 1 then
+          have     <= '0';
+          w_commit <= '1';
+          state    <= st_wait;
+        end if;
+
+      elsif state = st_wait then
+        pos <= to_unsigned(6, 11);
+        if silent = '1' then
+          state <= st_done;
+        elsif s_ready = '1' then
+          state <= st_peer;
+        end if;
+
+      elsif state = st_peer then
+        if have = '1' and hpos = 35 then
+          have    <= '0';
+          s_start <= '1';
+          pos     <= to_unsigned(C_HEADER, 11);
+          step    <= (others => '0');
+          state   <= st_fetch;
+          if m_kind = C_KIND_ARP then
+            state <= st_done;
+          elsif m_kind = C_KIND_ICMP then
+            pos     <= to_unsigned(38, 11);
+            end_pos <= unsigned(m_length) + 34;
+          end if;
+        end if;
+
+      elsif state = st_fetch then
+        step <= step + 1;
+        if fetched = '1' then
+          step  <= (others => '0');
+          state <= st_show;
+        end if;
+
+      elsif state = st_show then
+        if p_ready = '1' then
+          pos      <= pos + 1;
+          out_byte <= out_byte + 1;
+          if out_byte = 3 then
+            out_word <= out_word + 1;
+          end if;
+          state <= st_fetch;
+          if is_icmp = '1' then
+            out_word <= (others => '0');
+            if pos + 2 = end_pos then -- the byte after this one is the last
+              out_end  <= (others => '0');
+              out_word <= (others => '0');
+              out_byte <= "11";
+            elsif at_end = '1' then
+              state <= st_done;
+            else
+              out_byte <= "00";
+            end if;
+          elsif is_map = '1' and out_word = 3 and out_byte = 3 then
+            state <= st_cells;
+          elsif at_end = '1' and is_map = '0' then
+            state <= st_done;
+          end if;
+        end if;
+
+      elsif state = st_cells then
+        if f_valid = '1' and p_ready = '1' and f_last = '1' then
+          read_next <= read_next + 1;
+          read_left <= read_left - 1;
+          settle    <= (others => '1');
+          if read_left = 1 then
+            read_active <= '0';
+          end if;
+          state <= st_idle;
+        end if;
+
+      elsif state = st_done then
+        m_done <= '1';
+        -- One clock for m_valid to fall.
+        step   <= step + 1;
+        if step /= 0 then
+          m_done <= '0';
+          if step = 3 then
+            state <= st_idle;
+          end if;
+        end if;
+
+      elsif state = st_abort then
+        stop        <= '1';
+        row_clear   <= '1';
+        map_clear   <= '1';
+        read_active <= '0';
+        open_q      <= not close_q;
+        last_tile   <= (others => '1');
+        map_tile    <= (others => '1');
+        table_id    <= (others => '0');
+        table_words <= (others => '0');
+        quiet_ms    <= to_unsigned(G_SESSION_MS, 16);
+        events(22)  <= not close_q;
+        state       <= st_wait;
+        if by_timer = '1' then
+          state <= st_idle;
+        end if;
+      end if;
+
+      if rst = '1' then
+        state       <= st_idle;
+        open_q      <= '0';
+        have        <= '0';
+        read_active <= '0';
+        duplex_mode <= "00";
+        last_tile   <= (others => '1');
+        map_tile    <= (others => '1');
+        table_id    <= (others => '0');
+        table_words <= (others => '0');
+      end if;
+    end if;
+  end process p_sequence;
+
+  -- Tokens and time --------------------------------------------------------------------------------------------------
+  p_time : process (clk)
+  begin
+    if rising_edge(clk) then
+      -- x^32 + x^22 + x^2 + x + 1, maximal; which token comes depends on when the host asks.
+      dice     <= dice(30 downto 0) & (dice(31) xor dice(21) xor dice(1) xor dice(0));
+      ms_tick  <= to_bit(ms_clock = 0);
+      ms_clock <= ms_clock - 1;
+      if ms_clock = 0 then
+        ms_clock <= to_unsigned(G_CLK_KHZ - 1, ms_clock'length);
+      end if;
+
+      rows_short <= row_busy and not running;
+      events(24) <= '0';
+      events(25) <= '0';
+      if rows_short = '1' then
+        rows_wait  <= rows_wait + 1;
+        events(24) <= to_bit(rows_wait = 255);
+      end if;
+      if engine_wait = '1' then
+        map_wait   <= map_wait + 1;
+        events(25) <= to_bit(map_wait = 255);
+      end if;
+
+      if rst = '1' then
+        dice      <= x"5eed1234";
+        ms_clock  <= (others => '0');
+        rows_wait <= (others => '0');
+        map_wait  <= (others => '0');
+        events(24) <= '0';
+        events(25) <= '0';
+      end if;
+    end if;
+  end process p_time;
+
+  expired     <= to_bit(quiet_ms = 0);
+  full_duplex <= duplex_mode(1) or (pin_full_duplex and not duplex_mode(0));
+  session     <= open_q;
+
+  events(15 downto 0)  <= (others => '0');
+  events(21 downto 18) <= (others => '0');
+  events(31 downto 29) <= (others => '0');
+
+end architecture rtl;
