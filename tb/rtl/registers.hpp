@@ -1,90 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Words on the streams of entity psweep (docs/interfaces.md): register writes of a tile and of the plane table, map
-// cells, names of the error bits. Addresses and bits themselves: golden/control.hpp.
+// The engine's words (golden/registers.hpp) under the names that the Verilated engine's code uses.
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
-
-#include "golden/control.hpp"
+#include "golden/registers.hpp"
 
 namespace psweep::rtl {
 
-struct RegisterWrite {
-  uint16_t address;
-  uint32_t value;
-  uint64_t word() const { return uint64_t{address} << 32 | value; }  // s_cfg_tdata
-};
-
-inline std::vector<RegisterWrite> job_writes(const golden::TileJob& t) {
-  auto u = [](int v) { return static_cast<uint32_t>(v); };
-  auto offset = [](int i) { return static_cast<uint16_t>(golden::kRegTx + i); };
-  std::vector<RegisterWrite> w = {
-      {golden::kRegTileCols, u(t.tile_cols)},
-      {golden::kRegTileRows, u(t.tile_rows)},
-      {golden::kRegWinCols, u(t.win_cols)},
-      {golden::kRegWinRows, u(t.win_rows)},
-      {golden::kRegPlanes, u(t.planes)},
-      {golden::kRegThreshold, u(t.threshold)},
-      {offset(0), u(t.tx_left)},
-      {offset(1), u(t.ty_left)},
-      {offset(2), u(t.tx_right)},
-      {offset(3), u(t.ty_right)},
-  };
-  auto bounds = [&](uint16_t base, const golden::Bounds& b) {
-    const int values[] = {b.x_lo, b.x_hi, b.y_lo, b.y_hi};
-    for (int i = 0; i < 4; ++i) w.push_back({static_cast<uint16_t>(base + i), u(values[i])});
-  };
-  bounds(golden::kRegLeft, t.left);
-  bounds(golden::kRegRight, t.right);
-  return w;
-}
-
-inline std::vector<RegisterWrite> table_writes(const std::vector<golden::PlaneEntry>& table) {
-  std::vector<RegisterWrite> w;
-  for (size_t k = 0; k < table.size(); ++k) {
-    const golden::PlaneEntry& p = table[k];
-    const uint32_t fields[8] = {static_cast<uint32_t>(p.x0_left),
-                                static_cast<uint32_t>(p.y0_left),
-                                static_cast<uint32_t>(p.x0_right),
-                                static_cast<uint32_t>(p.y0_right),
-                                p.dx_left,
-                                p.dy_left,
-                                p.dx_right,
-                                p.dy_right};
-    for (size_t f = 0; f < 8; ++f) w.push_back({static_cast<uint16_t>(golden::kRegTable + 8 * k + f), fields[f]});
-  }
-  return w;
-}
-
-// m_map_tdata = {mask(3:0), plane, frac, v}
-inline golden::MapCell unpack_cell(const golden::Config& c, uint64_t word) {
-  auto take = [&word](int bits) {
-    const uint64_t value = word & ((uint64_t{1} << bits) - 1);
-    word >>= bits;
-    return static_cast<uint16_t>(value);
-  };
-  golden::MapCell cell;
-  cell.v = take(c.mncc_bits);
-  cell.frac = take(c.frac_bits);
-  cell.plane = take(c.plane_bits());
-  cell.mask = static_cast<uint8_t>(take(4));
-  return cell;
-}
-inline uint64_t pack_cell(const golden::Config& c, const golden::MapCell& cell) {
-  uint64_t word = cell.mask;
-  word = word << c.plane_bits() | cell.plane;
-  word = word << c.frac_bits | cell.frac;
-  return word << c.mncc_bits | cell.v;
-}
-
-// "config, short" and so on; "none" for 0.
-inline std::string error_names(unsigned bits) {
-  static const char* const names[] = {"config", "table", "short", "long", "window", "address", "busy"};
-  std::string text;
-  for (unsigned i = 0; i < 7; ++i)
-    if (bits >> i & 1) text += (text.empty() ? "" : ", ") + std::string(names[i]);
-  return text.empty() ? "none" : text;
-}
+using golden::error_names;
+using golden::job_writes;
+using golden::pack_cell;
+using golden::RegisterWrite;
+using golden::table_writes;
+using golden::unpack_cell;
 
 }  // namespace psweep::rtl
