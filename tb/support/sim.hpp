@@ -28,12 +28,18 @@ struct Agent {
   virtual void sample() {}
 };
 
+// What an agent may ask its clock for.
+struct CycleCounter {
+  virtual ~CycleCounter() = default;
+  virtual uint64_t cycle() const = 0;
+};
+
 struct Timeout : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 template <class Dut>
-class Sim {
+class Sim : public CycleCounter {
  public:
   explicit Sim(uint64_t timeout, uint32_t seed = 1, const std::string& wave = "") : timeout_(timeout) {
     context_.randReset(2);
@@ -45,7 +51,7 @@ class Sim {
   }
   Sim(const Sim&) = delete;
   Sim& operator=(const Sim&) = delete;
-  ~Sim() {
+  ~Sim() override {
 #if VM_TRACE
     if (trace_) trace_->close();
 #endif
@@ -53,7 +59,7 @@ class Sim {
   }
 
   Dut& dut() { return *dut_; }
-  uint64_t cycle() const { return cycle_; }
+  uint64_t cycle() const override { return cycle_; }
   void add(Agent& agent) { agents_.push_back(&agent); }
 
   // Agents sleep during reset.

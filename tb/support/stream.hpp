@@ -4,6 +4,8 @@
 //   auto in = stream_ports(&dut.s_pix_tvalid, &dut.s_pix_tready, &dut.s_pix_tdata, &dut.s_pix_tlast);
 //   StreamDriver driver(sim, in, seed, stall);  sim.add(driver);  driver.push(data, last);
 //   StreamMonitor monitor(sim, out, seed, stall, [](const Beat& b) { .. });  sim.add(monitor);
+// With several clocks the first argument is the ClockDomain (support/clocks.hpp), and the class is written out:
+//   StreamDriver<Vdut, decltype(in)> driver(w_clock, in, ..);
 // Payload up to 64 bits (Verilator's 8- to 64-bit ports); tlast may be missing (nullptr). Stall = probability of an
 // idle clock (driver) or of tready low (monitor). While tvalid is low the driver shows random payload.
 #pragma once
@@ -39,7 +41,7 @@ template <class Dut, class Ports>
 class StreamDriver : public Agent {
  public:
   // data_bits: width of tdata, for the garbage shown while idle.
-  StreamDriver(Sim<Dut>& sim, Ports ports, int data_bits, uint32_t seed, double stall = 0)
+  StreamDriver(const CycleCounter& sim, Ports ports, int data_bits, uint32_t seed, double stall = 0)
       : sim_(sim),
         ports_(ports),
         mask_(data_bits >= 64 ? ~uint64_t{0} : (uint64_t{1} << data_bits) - 1),
@@ -77,7 +79,7 @@ class StreamDriver : public Agent {
   }
 
  private:
-  Sim<Dut>& sim_;
+  const CycleCounter& sim_;
   Ports ports_;
   uint64_t mask_;
   std::mt19937 random_;
@@ -87,10 +89,14 @@ class StreamDriver : public Agent {
   uint64_t sent_ = 0, last_clock_ = 0;
 };
 
+template <class Dut, class Ports, class... Rest>
+StreamDriver(Sim<Dut>&, Ports, Rest...) -> StreamDriver<Dut, Ports>;
+
 template <class Dut, class Ports>
 class StreamMonitor : public Agent {
  public:
-  StreamMonitor(Sim<Dut>& sim, Ports ports, uint32_t seed, double stall, std::function<void(const Beat&)> sink)
+  StreamMonitor(const CycleCounter& sim, Ports ports, uint32_t seed, double stall,
+                std::function<void(const Beat&)> sink)
       : sim_(sim), ports_(ports), random_(seed), stall_(stall), sink_(std::move(sink)) {
     *ports_.ready = 0;
   }
@@ -117,7 +123,7 @@ class StreamMonitor : public Agent {
   }
 
  private:
-  Sim<Dut>& sim_;
+  const CycleCounter& sim_;
   Ports ports_;
   std::mt19937 random_;
   std::bernoulli_distribution stall_;
@@ -126,5 +132,8 @@ class StreamMonitor : public Agent {
   Beat waiting_;
   uint64_t beats_ = 0, protocol_errors_ = 0;
 };
+
+template <class Dut, class Ports, class... Rest>
+StreamMonitor(Sim<Dut>&, Ports, Rest...) -> StreamMonitor<Dut, Ports>;
 
 }  // namespace psweep::tb
