@@ -16,4 +16,5 @@ cdc_sync.vhd
 reset_sync.vhd
 ram_dc.vhd
 async_fifo.vhd
+packet_rx.vhd
 responder.vhd

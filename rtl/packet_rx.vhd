@@ -1,0 +1,531 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- packet_rx: frames of the MAC -> messages for the responder: ARP requests, ICMP echo requests, UDP to one port.
+--   Input     : bytes behind the SFD, FCS included; then one beat with s_last whose s_data is the MAC's verdict (mac_rx;
+--               0 = good: at least 64, at most 1518 bytes, FCS right). s_ready is low in the one clock behind a verdict
+--   Accepts   : destination own_mac or broadcast. ARP (RFC 826): Ethernet, IPv4, request, target own_ip. IPv4 (RFC 791):
+--               header of 5 words, total length at least 28 and within the frame, header checksum, not a fragment,
+--               destination own_ip; with ICMP (RFC 792): type 8, code 0, checksum over the message; or with UDP (RFC
+--               768): port G_UDP_PORT, length = total length - 20, checksum (0: none). What lies behind the IP packet
+--               (padding, FCS) is not looked at
+--   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP), m_length (ICMP: bytes from frame byte 34 on, UDP: payload, from
+--               byte 42 on; ARP: 0) of the oldest message, until m_done; its frame through r_addr, r_data (1 clock)
+--   Slots     : G_SLOTS frames. Bytes are stored as they come, and a frame becomes a message at its verdict only. Its
+--               slot must be free at its first byte. Addresses wrap within the slot, whatever the input
+--   Events    : bit n = counter n of docs/protocol.md, one pulse a frame two clocks behind its verdict, a message two (0
+--               and its kind). Order: the MAC's verdict (8, 5, 4, 3, 2, 1), 6 destination MAC, 9 ethertype or ARP, 10
+--               IP header, 11 fragment, 9 protocol, port or ICMP type, 12 UDP length or checksum, 7 no slot
+--   Latency   : m_valid 4 clocks behind the verdict
+--   Structure : one position counter. It starts at -34, so that it counts the bytes behind the IP header without a
+--               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and a
+--               bit that sticks remembers the class of what differed.
+--               Sums: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits for
+--               the next byte, whichever half that is. One for the IP header; one for ICMP, or for UDP with addresses,
+--               total length and a constant in place of the pseudo header (17 + length = total length - 3). Both
+--               are right when all ones; the bytes behind the end add nothing, but settle the carry.
+--               Whatever is past the end of the IP packet must be 4 bytes at least, the FCS: else the length was wrong
+--   Reset     : no message, next byte is the first of a frame; RAM and data registers have no reset
+--   Golden    : sw/golden/packet_rx.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity packet_rx is
+  generic (
+    G_SLOTS    : integer := 2;    -- 2 or 4
+    G_UDP_PORT : integer := 20563 -- 1 .. 65535
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    s_valid : in  std_logic;
+    s_ready : out std_logic;
+    s_last  : in  std_logic;
+    s_data  : in  std_logic_vector(7 downto 0);
+
+    own_mac : in  std_logic_vector(47 downto 0); -- first byte on the wire on the left; static
+    own_ip  : in  std_logic_vector(31 downto 0);
+
+    m_valid  : out std_logic;
+    m_kind   : out std_logic_vector(1 downto 0);
+    m_length : out std_logic_vector(10 downto 0);
+    m_done   : in  std_logic; -- pulse, only while m_valid: the slot is free
+    r_addr   : in  std_logic_vector(10 downto 0);
+    r_data   : out std_logic_vector(7 downto 0);
+
+    events : out std_logic_vector(15 downto 0)
+  );
+end entity packet_rx;
+
+architecture rtl of packet_rx is
+
+  constant C_SLOT_W : integer := clog2(G_SLOTS);
+  constant C_HEADER : integer := 34; -- bytes up to the end of the IP header: position 0 is frame byte 34
+  constant C_FIRST  : unsigned(10 downto 0) := to_unsigned(2048 - C_HEADER, 11);
+  constant C_PORT   : unsigned(15 downto 0) := to_unsigned(G_UDP_PORT mod 65536, 16);
+
+  -- Position of the byte on s_data.
+  signal fire   : std_logic;
+  signal pos    : unsigned(10 downto 0);
+  signal near   : std_logic;             -- frame byte 0 .. 41, of which the lower bits of pos know which
+  signal place  : unsigned(5 downto 0);
+  signal header : std_logic;             -- frame byte 0 .. 33
+  signal arp    : std_logic;             -- from frame byte 13 on
+  signal icmp   : std_logic;             -- from frame byte 23 on
+  signal udp    : std_logic;
+
+  -- The byte that is expected there.
+  signal mac_byte    : std_logic_vector(7 downto 0);
+  signal ip_byte     : std_logic_vector(7 downto 0);
+  signal length_byte : std_logic_vector(7 downto 0);
+  signal fixed_byte  : std_logic_vector(7 downto 0);
+  signal want_next   : std_logic_vector(7 downto 0);
+
+  -- One clock later: the data, what it should be, and to what class it belongs.
+  signal got          : std_logic;
+  signal verdict      : std_logic; -- data is the verdict
+  signal data         : std_logic_vector(7 downto 0);
+  signal want         : std_logic_vector(7 downto 0);
+  signal of_mac       : std_logic;
+  signal of_type      : std_logic; -- ethertype, ARP
+  signal of_head      : std_logic;
+  signal of_fragment  : std_logic;
+  signal of_port      : std_logic; -- protocol, port, ICMP type
+  signal of_length    : std_logic;
+  signal of_checksum  : std_logic;
+  signal only_low     : std_logic; -- bits 7..6 do not matter (fragment flags)
+  signal only_high    : std_logic; -- bits 2..0 do not matter (total length)
+  signal takes_length : std_logic;
+  signal differs      : std_logic;
+
+  -- What was wrong so far.
+  signal not_mine     : std_logic;
+  signal not_all      : std_logic; -- destination is not broadcast
+  signal bad_type     : std_logic;
+  signal bad_head     : std_logic;
+  signal bad_fragment : std_logic;
+  signal bad_port     : std_logic;
+  signal bad_length   : std_logic;
+  signal has_checksum : std_logic;
+
+  -- Length of the IP packet's content, and its end.
+  signal upper  : std_logic_vector(2 downto 0);
+  signal length : unsigned(10 downto 0);
+  signal behind : std_logic_vector(4 downto 0); -- bit n: data is at least n bytes behind the first one past the end
+
+  -- Sums.
+  signal add_head   : std_logic;
+  signal add_body   : std_logic;
+  signal add_minus3 : std_logic_vector(1 downto 0); -- the two bytes of -3 (mod 65535), low one on the right
+  signal restart    : std_logic;
+  signal head_byte  : std_logic_vector(7 downto 0);
+  signal body_byte  : std_logic_vector(7 downto 0);
+  signal head_add   : unsigned(9 downto 0);
+  signal body_add   : unsigned(9 downto 0);
+  signal head_sum   : unsigned(15 downto 0);
+  signal head_carry : std_logic;
+  signal body_sum   : unsigned(15 downto 0);
+  signal body_carry : std_logic;
+
+  -- Judgement.
+  signal ip_bad  : std_logic;
+  signal sum_bad : std_logic;
+  signal outcome : std_logic_vector(15 downto 0);
+  signal commit  : std_logic;
+
+  -- Slots: counters with one bit more than a slot number.
+  signal write_slot : unsigned(C_SLOT_W downto 0);
+  signal read_slot  : unsigned(C_SLOT_W downto 0);
+  signal full       : std_logic;
+  signal empty      : std_logic;
+  signal opening    : std_logic; -- the next byte is the first of a frame
+  signal room       : std_logic; -- the frame has a slot
+  signal room_now   : std_logic;
+
+  signal frame_we    : std_logic;
+  signal frame_waddr : std_logic_vector(C_SLOT_W + 10 downto 0);
+  signal frame_raddr : std_logic_vector(C_SLOT_W + 10 downto 0);
+  signal read_pos    : unsigned(10 downto 0);
+
+  signal info_waddr   : std_logic_vector(C_SLOT_W - 1 downto 0);
+  signal info_raddr   : std_logic_vector(C_SLOT_W - 1 downto 0);
+  signal info_write   : std_logic_vector(12 downto 0);
+  signal info_read    : std_logic_vector(12 downto 0);
+  signal reply_length : unsigned(10 downto 0);
+
+  -- Frame byte n, as place.
+  function at_byte (code : unsigned; n : natural) return std_logic is
+  begin
+    return to_bit(code = to_unsigned((n + 64 - C_HEADER) mod 64, 6));
+  end function at_byte;
+
+begin
+
+  assert G_SLOTS = 2 or G_SLOTS = 4
+    report "packet_rx: G_SLOTS=" & integer'image(G_SLOTS) & " is neither 2 nor 4"
+    severity failure;
+  assert G_UDP_PORT >= 1 and G_UDP_PORT <= 65535
+    report "packet_rx: G_UDP_PORT=" & integer'image(G_UDP_PORT) & " outside 1..65535"
+    severity failure;
+
+  -- Position ----------------------------------------------------------------------------------------------------------
+  s_ready <= not verdict;
+  fire    <= s_valid and not verdict;
+  place   <= pos(5 downto 0);
+  header  <= pos(10) and pos(9); -- a body never gets that far: 1518 bytes
+  udp     <= not arp and not icmp;
+
+  p_position : process (clk)
+  begin
+    if rising_edge(clk) then
+      if fire = '1' then
+        pos <= pos + 1;
+        if at_byte(place, 41) = '1' then
+          near <= '0';
+        end if;
+        -- One bit decides, the comparison with the whole byte follows.
+        if near = '1' and at_byte(place, 13) = '1' then
+          arp <= s_data(1);
+        end if;
+        if near = '1' and at_byte(place, 23) = '1' then
+          icmp <= not s_data(4) and not arp;
+        end if;
+      end if;
+      if rst = '1' or (fire = '1' and s_last = '1') then
+        pos  <= C_FIRST;
+        near <= '1';
+      end if;
+    end if;
+  end process p_position;
+
+  -- Expected bytes ----------------------------------------------------------------------------------------------------
+  p_mac_byte : process (own_mac, place)
+  begin
+    if place(2 downto 0) = "110" then
+      mac_byte <= own_mac(47 downto 40);
+    elsif place(2 downto 0) = "111" then
+      mac_byte <= own_mac(39 downto 32);
+    elsif place(1 downto 0) = "00" then
+      mac_byte <= own_mac(31 downto 24);
+    elsif place(1 downto 0) = "01" then
+      mac_byte <= own_mac(23 downto 16);
+    elsif place(1 downto 0) = "10" then
+      mac_byte <= own_mac(15 downto 8);
+    else
+      mac_byte <= own_mac(7 downto 0);
+    end if;
+  end process p_mac_byte;
+
+  -- Target of ARP and destination of IP both begin at a multiple of 4.
+  p_ip_byte : process (own_ip, place)
+  begin
+    if place(1 downto 0) = "00" then
+      ip_byte <= own_ip(31 downto 24);
+    elsif place(1 downto 0) = "01" then
+      ip_byte <= own_ip(23 downto 16);
+    elsif place(1 downto 0) = "10" then
+      ip_byte <= own_ip(15 downto 8);
+    else
+      ip_byte <= own_ip(7 downto 0);
+    end if;
+  end process p_ip_byte;
+
+  length_byte <= "00000" & std_logic_vector(length(10 downto 8)) when place(0) = '0' else
+                 std_logic_vector(length(7 downto 0));
+
+  -- Zero where nothing else is said; ARP and IP share what they can.
+  p_fixed_byte : process (place, arp, icmp, s_data)
+  begin
+    fixed_byte <= (others => '0');
+    if at_byte(place, 12) = '1' then
+      fixed_byte <= x"08";
+    elsif at_byte(place, 13) = '1' then
+      fixed_byte <= "00000" & s_data(1) & s_data(1) & '0';
+    elsif at_byte(place, 14) = '1' then
+      if arp = '0' then
+        fixed_byte <= x"45";
+      end if;
+    elsif at_byte(place, 15) = '1' or at_byte(place, 21) = '1' then
+      fixed_byte <= "0000000" & arp;
+    elsif at_byte(place, 16) = '1' then
+      fixed_byte <= "0000" & arp & "000";
+    elsif at_byte(place, 18) = '1' then
+      fixed_byte <= x"06";
+    elsif at_byte(place, 19) = '1' then
+      fixed_byte <= x"04";
+    elsif at_byte(place, 23) = '1' then
+      fixed_byte <= "000" & s_data(4) & "0001";
+    elsif at_byte(place, 34) = '1' then
+      fixed_byte <= x"08";
+    elsif at_byte(place, 36) = '1' then
+      fixed_byte <= std_logic_vector(C_PORT(15 downto 8));
+    elsif at_byte(place, 37) = '1' then
+      fixed_byte <= std_logic_vector(C_PORT(7 downto 0));
+    end if;
+  end process p_fixed_byte;
+
+  p_want : process (place, arp, udp, mac_byte, ip_byte, length_byte, fixed_byte)
+  begin
+    if place(5 downto 3) = "011" or place(5 downto 2) = "1000" then
+      want_next <= mac_byte;                           -- frame bytes 0 to 5
+    elsif place(5 downto 2) = "1111" or (place(5 downto 2) = "0001" and arp = '1') then
+      want_next <= ip_byte;                            -- 30 to 33, or 38 to 41 of ARP
+    elsif place(5 downto 1) = "00010" then
+      want_next <= length_byte;                        -- 38, 39 of UDP
+    else
+      want_next <= fixed_byte;
+    end if;
+  end process p_want;
+
+  p_byte : process (clk)
+  begin
+    if rising_edge(clk) then
+      got     <= fire and not s_last and not rst;
+      verdict <= fire and s_last and not rst;
+      data    <= s_data;
+      want    <= want_next;
+
+      of_mac       <= near and to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
+      of_type      <= near and (at_byte(place, 12) or at_byte(place, 13) or
+                      (arp and (to_bit(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
+                                to_bit(place(5 downto 2) = "0001"))));
+      of_head      <= near and (at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111"));
+      of_fragment  <= near and (at_byte(place, 20) or at_byte(place, 21));
+      of_port      <= near and (at_byte(place, 23) or
+                      (icmp and to_bit(place(5 downto 1) = "00000")) or (udp and to_bit(place(5 downto 1) = "00001")));
+      of_length    <= near and udp and to_bit(place(5 downto 1) = "00010");
+      of_checksum  <= near and udp and to_bit(place(5 downto 1) = "00011");
+      only_low     <= at_byte(place, 20) and not arp;
+      only_high    <= at_byte(place, 16) and not arp;
+      takes_length <= near and at_byte(place, 17);
+
+      add_head   <= header and to_bit(place >= 44);
+      add_body   <= not near or to_bit(place = 46 or place = 47 or place >= 56 or place < 8);
+      add_minus3 <= (others => near and to_bit(place = 48 or place = 49));
+      if place(0) = '1' then
+        add_minus3(0) <= '0';
+      end if;
+      restart <= near and icmp and to_bit(place = 63);
+    end if;
+  end process p_byte;
+
+  differs <= to_bit((data(7 downto 6) /= want(7 downto 6) and only_low = '0') or data(5 downto 3) /= want(5 downto 3) or
+                    (data(2 downto 0) /= want(2 downto 0) and only_high = '0'));
+
+  p_wrong : process (clk)
+  begin
+    if rising_edge(clk) then
+      if got = '1' then
+        not_mine     <= not_mine or (of_mac and differs);
+        not_all      <= not_all or (of_mac and to_bit(data /= x"ff"));
+        bad_type     <= bad_type or (of_type and differs);
+        bad_head     <= bad_head or (of_head and differs);
+        bad_fragment <= bad_fragment or (of_fragment and differs);
+        bad_port     <= bad_port or (of_port and differs);
+        bad_length   <= bad_length or (of_length and differs);
+        has_checksum <= has_checksum or (of_checksum and differs);
+      end if;
+      if rst = '1' or verdict = '1' then
+        not_mine     <= '0';
+        not_all      <= '0';
+        bad_type     <= '0';
+        bad_head     <= '0';
+        bad_fragment <= '0';
+        bad_port     <= '0';
+        bad_length   <= '0';
+        has_checksum <= '0';
+      end if;
+    end if;
+  end process p_wrong;
+
+  -- Length and end ----------------------------------------------------------------------------------------------------
+  -- An ARP frame has the length of the shortest IP packet: so it must be there as far, too.
+  p_length : process (clk)
+  begin
+    if rising_edge(clk) then
+      if got = '1' then
+        upper <= data(2 downto 0);
+      end if;
+      if got = '1' and takes_length = '1' then
+        length <= unsigned(upper & data) - 20;
+      end if;
+      if arp = '1' then
+        length <= to_unsigned(8, 11);
+      end if;
+      if pos = length then
+        behind(0) <= '1';
+      end if;
+      if got = '1' then
+        behind(4 downto 1) <= behind(3 downto 0);
+      end if;
+      if header = '1' then
+        behind <= (others => '0');
+      end if;
+    end if;
+  end process p_length;
+
+  -- Sums --------------------------------------------------------------------------------------------------------------
+  head_byte <= data when add_head = '1' else
+               (others => '0');
+  body_byte <= (7 downto 2 => add_minus3(1), 1 downto 0 => add_minus3(0)) when add_body = '0' else
+               data when behind(0) = '0' else
+               (others => '0');
+
+  -- The lowest bit brings the carry in.
+  head_add <= ('0' & head_sum(15 downto 8) & '1') + ('0' & unsigned(head_byte) & head_carry);
+  body_add <= ('0' & body_sum(15 downto 8) & '1') + ('0' & unsigned(body_byte) & body_carry);
+
+  p_sums : process (clk)
+  begin
+    if rising_edge(clk) then
+      if got = '1' then
+        head_sum   <= head_sum(7 downto 0) & head_add(8 downto 1);
+        head_carry <= head_add(9);
+        body_sum   <= body_sum(7 downto 0) & body_add(8 downto 1);
+        body_carry <= body_add(9);
+      end if;
+      if rst = '1' or verdict = '1' then
+        head_sum   <= (others => '0');
+        head_carry <= '0';
+      end if;
+      if rst = '1' or verdict = '1' or restart = '1' then
+        body_sum   <= (others => '0');
+        body_carry <= '0';
+      end if;
+    end if;
+  end process p_sums;
+
+  -- Judgement ---------------------------------------------------------------------------------------------------------
+  ip_bad  <= to_bit(length(10 downto 3) = 0) or not behind(4) or
+             (not arp and (bad_head or to_bit(head_sum /= x"ffff")));
+  sum_bad <= bad_length or (to_bit(body_sum /= x"ffff") and (icmp or has_checksum));
+
+  p_outcome : process (data, not_mine, not_all, bad_type, ip_bad, arp, icmp, bad_fragment, bad_port, sum_bad, room)
+  begin
+    outcome <= (others => '0');
+    if data(5) = '1' then
+      outcome(8) <= '1';
+    elsif data(4) = '1' then
+      outcome(5) <= '1';
+    elsif data(3) = '1' then
+      outcome(4) <= '1';
+    elsif data(2) = '1' then
+      outcome(3) <= '1';
+    elsif data(1) = '1' then
+      outcome(2) <= '1';
+    elsif data(0) = '1' then
+      outcome(1) <= '1';
+    elsif not_mine = '1' and not_all = '1' then
+      outcome(6) <= '1';
+    elsif bad_type = '1' then
+      outcome(9) <= '1';
+    elsif ip_bad = '1' then
+      outcome(10) <= '1';
+    elsif bad_fragment = '1' and arp = '0' then
+      outcome(11) <= '1';
+    elsif bad_port = '1' and arp = '0' then
+      outcome(9) <= '1';
+    elsif sum_bad = '1' and arp = '0' then
+      outcome(12) <= '1';
+    elsif room = '0' then
+      outcome(7) <= '1';
+    else
+      outcome(0)  <= '1';
+      outcome(13) <= arp;
+      outcome(14) <= icmp;
+      outcome(15) <= not arp and not icmp;
+    end if;
+  end process p_outcome;
+
+  commit <= verdict and outcome(0);
+
+  p_events : process (clk)
+  begin
+    if rising_edge(clk) then
+      events <= outcome;
+      if verdict = '0' then
+        events <= (others => '0');
+      end if;
+    end if;
+  end process p_events;
+
+  -- Slots -------------------------------------------------------------------------------------------------------------
+  empty    <= to_bit(write_slot = read_slot);
+  full     <= to_bit(write_slot(C_SLOT_W - 1 downto 0) = read_slot(C_SLOT_W - 1 downto 0)) and
+              (write_slot(C_SLOT_W) xor read_slot(C_SLOT_W));
+  room_now <= not full when opening = '1' else
+              room;
+
+  p_slots : process (clk)
+  begin
+    if rising_edge(clk) then
+      room <= room_now;
+      if fire = '1' then
+        opening <= '0';
+      end if;
+      if commit = '1' then
+        write_slot <= write_slot + 1;
+      end if;
+      if m_done = '1' then
+        read_slot <= read_slot + 1;
+      end if;
+      m_valid <= not empty and not m_done; -- info_read follows read_slot by one clock
+      if rst = '1' or verdict = '1' then
+        opening <= '1';
+      end if;
+      if rst = '1' then
+        write_slot <= (others => '0');
+        read_slot  <= (others => '0');
+        m_valid    <= '0';
+      end if;
+    end if;
+  end process p_slots;
+
+  frame_we    <= fire and not s_last and room_now;
+  frame_waddr <= std_logic_vector(write_slot(C_SLOT_W - 1 downto 0) & pos);
+  read_pos    <= unsigned(r_addr) - C_HEADER;
+  frame_raddr <= std_logic_vector(read_slot(C_SLOT_W - 1 downto 0) & read_pos);
+
+  u_frames : entity work.ram_sdp
+    generic map (
+      G_DATA_W  => 8,
+      G_DEPTH   => G_SLOTS * 2048,
+      G_LATENCY => 1
+    )
+    port map (
+      clk   => clk,
+      we    => frame_we,
+      waddr => frame_waddr,
+      wdata => s_data,
+      raddr => frame_raddr,
+      rdata => r_data
+    );
+
+  -- The UDP header is no part of the message; ARP: 8 - 8.
+  reply_length <= length when icmp = '1' else
+                  length - 8;
+
+  info_waddr <= std_logic_vector(write_slot(C_SLOT_W - 1 downto 0));
+  info_raddr <= std_logic_vector(read_slot(C_SLOT_W - 1 downto 0));
+  info_write <= (not arp and not icmp) & icmp & std_logic_vector(reply_length);
+
+  u_info : entity work.ram_sdp
+    generic map (
+      G_DATA_W  => 13,
+      G_DEPTH   => G_SLOTS,
+      G_LATENCY => 1
+    )
+    port map (
+      clk   => clk,
+      we    => commit,
+      waddr => info_waddr,
+      wdata => info_write,
+      raddr => info_raddr,
+      rdata => info_read
+    );
+
+  m_kind   <= info_read(12 downto 11);
+  m_length <= info_read(10 downto 0);
+
+end architecture rtl;
