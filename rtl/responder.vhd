@@ -3,8 +3,8 @@
 --   Protocol  : docs/protocol.md, sw/net/protocol.hpp
 --   Structure : one message at a time, bytes in order, no CPU. The waiting frame is read from packet_rx's RAM byte by
 --               byte through one 32-bit shift register (word): first the header (bytes 42 to 57), then the arguments.
---               Rows go on to the row buffer as they pass, one byte a clock. The reply leaves through the same register:
---               its header is the request's, read again, but for four bytes; its body is loaded word by word.
+--               Rows go on to the row buffer as they pass, one byte a clock. The reply is made byte by byte: its
+--               header is the request's, read again, but for four bytes; its body is one big multiplexer.
 --               A message is obeyed only after packet_rx has found the whole frame good, so nothing has to be undone
 --   Map       : between messages, chunk after chunk of the READ in force, as they become available
 --   Rate      : rows and cells one byte a clock; replies one byte in 6 clocks (at 60 MHz a status in 6 us)
@@ -211,6 +211,19 @@ architecture rtl of responder is
   end function info_words;
   constant C_INFO_WORDS : t_words := info_words;
 
+  type t_info is array (127 downto 0) of std_logic_vector(7 downto 0);
+  function info_bytes return t_info is
+    variable v_bytes : t_info;
+  begin
+    for i in 0 to 127 loop
+      v_bytes(i) := C_INFO_WORDS(i / 4)(31 - 8 * (i mod 4) downto 24 - 8 * (i mod 4));
+    end loop;
+    return v_bytes;
+  end function info_bytes;
+  constant C_INFO_BYTES : t_info := info_bytes;
+
+  type t_bytes is array (63 downto 0) of std_logic_vector(7 downto 0);
+
   type t_state is (
     st_idle,   -- the next message, or the next chunk of the map
     st_header, -- bytes 42 to 57 pass
@@ -267,12 +280,15 @@ architecture rtl of responder is
   signal chunks      : std_logic_vector(15 downto 0);
   signal close_q     : std_logic; -- st_abort ends the session, else it begins one
   signal by_timer    : std_logic; -- nobody waits for an answer
-  signal is_next     : std_logic; -- word: tile is last_tile + 1
+  signal known       : unsigned(15 downto 0); -- what the message's number is compared with
+  signal distance    : unsigned(15 downto 0);
+  signal is_next     : std_logic; -- the number is the known one + 1
   signal is_last     : std_logic;
   signal idle_chip   : std_logic; -- no tile anywhere but in the map buffer
 
   -- The READ in force.
   signal read_active : std_logic;
+  signal of_map      : std_logic; -- READ is for the tile in the map buffer
   signal read_tile   : unsigned(15 downto 0);
   signal read_next   : unsigned(15 downto 0);
   signal read_left   : unsigned(15 downto 0);
@@ -291,9 +307,16 @@ architecture rtl of responder is
   signal step       : unsigned(5 downto 0); -- of st_fetch
   signal in_header  : std_logic;
   signal in_bitmap  : std_logic;
+  signal lists      : std_logic; -- the message is INFO or COUNTERS
+  signal is_list    : std_logic; -- and their body is due
   signal fetched    : std_logic;
-  signal body_word  : std_logic_vector(31 downto 0);
+  signal words      : std_logic_vector(415 downto 0);
+  signal word_bytes : t_bytes;
+  signal own_word   : std_logic;
+  signal byte_index : unsigned(5 downto 0);
   signal body_index : unsigned(4 downto 0); -- of a word in INFO and COUNTERS
+  signal list_index : unsigned(6 downto 0);
+  signal list_byte  : std_logic_vector(7 downto 0);
   signal head_byte  : std_logic_vector(7 downto 0);
   signal status     : std_logic_vector(15 downto 0);
   signal at_end     : std_logic;
@@ -332,8 +355,13 @@ begin
   long_start <= to_bit(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
   long_write <= to_bit(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
 
-  is_next   <= to_bit(unsigned(word(31 downto 16)) = last_tile + 1);
-  is_last   <= to_bit(unsigned(word(31 downto 16)) = last_tile);
+  -- One subtraction for all numbers that have to be in order.
+  known    <= last_tile when msg_type = C_START or msg_type = C_WRITE
+              else table_id when msg_type = C_TABLE
+              else map_tile;
+  distance <= unsigned(word(31 downto 16)) - known;
+  is_last  <= to_bit(distance = 0);
+  is_next  <= to_bit(distance = 1);
   idle_chip <= not row_busy and not staged and not running and to_bit(engine_state = C_STATE_IDLE);
 
   w_valid    <= have and to_bit(state = st_rows);
@@ -383,72 +411,58 @@ begin
   s_kind    <= C_KIND_UDP when is_map = '1' else m_kind;
   s_bank    <= use_bank_1;
   in_header <= to_bit(out_word < 4);
-  in_bitmap <= to_bit(out_word >= 13) and to_bit(msg_type /= C_INFO and msg_type /= C_COUNTERS);
+  in_bitmap <= to_bit(out_word >= 13) and not is_list and not is_map;
+  is_list   <= lists and not in_header and not is_map;
   at_end    <= to_bit(out_word = out_end and out_byte = 3);
   body_index <= out_word(4 downto 0) - 4;
   c_index   <= std_logic_vector(body_index);
-  b_index   <= std_logic_vector(resize(out_word - 13, 5)) & std_logic_vector(step(4 downto 0));
+  b_index   <= std_logic_vector(resize(out_word - 13, 5) & out_byte & step(2 downto 0));
 
   status <= "00000" & engine_state & pin_speed_100 & (duplex_mode(1) or (pin_full_duplex and not duplex_mode(0)))
             & failed & map_complete & map_busy & running & row_busy & open_q;
 
-  p_body : process (is_map, in_header, out_word, body_index, token, read_seq, read_tile, read_next, msg_type, c_data,
-                    own_mac, last_tile, status, run_tile, map_tile, row_base, row_received, table_id, table_words,
-                    map_count, errors, error_count, tiles_done, tiles_dropped, tile_clocks, window_errors, failed_tile)
-  begin
-    if is_map = '1' then
-      if out_word = 0 then
-        body_word <= x"5053018c";
-      elsif out_word = 1 then
-        body_word <= token;
-      elsif out_word = 2 then
-        body_word <= read_seq & x"0000";
-      else
-        body_word <= std_logic_vector(read_tile) & std_logic_vector(read_next);
-      end if;
-    elsif in_header = '1' then
-      body_word <= token; -- only OPEN takes anything from here
-    elsif msg_type = C_COUNTERS then
-      body_word <= c_data;
-    elsif msg_type = C_INFO then
-      if out_word = 18 then
-        body_word <= x"0000" & own_mac(47 downto 32);
-      elsif out_word = 19 then
-        body_word <= own_mac(31 downto 0);
-      else
-        body_word <= C_INFO_WORDS(to_integer(body_index));
-      end if;
-    elsif out_word = 4 then
-      body_word <= std_logic_vector(last_tile) & status;
-    elsif out_word = 5 then
-      body_word <= run_tile & std_logic_vector(map_tile);
-    elsif out_word = 6 then
-      body_word <= row_base & row_received;
-    elsif out_word = 7 then
-      body_word <= std_logic_vector(table_id) & "00" & std_logic_vector(table_words);
-    elsif out_word = 8 then
-      body_word <= x"00" & map_count;
-    elsif out_word = 9 then
-      body_word <= x"00" & errors & error_count;
-    elsif out_word = 10 then
-      body_word <= tiles_done & tiles_dropped;
-    elsif out_word = 11 then
-      body_word <= tile_clocks;
-    else
-      body_word <= window_errors & failed_tile;
-    end if;
-  end process p_body;
+  -- Bytes of map packets (words 0 to 3; word 1 also for OPEN) and of the status block (4 to 12).
+  words <= x"5053018c"
+           & token
+           & read_seq & x"0000"
+           & std_logic_vector(read_tile) & std_logic_vector(read_next)
+           & std_logic_vector(last_tile) & status
+           & run_tile & std_logic_vector(map_tile)
+           & row_base & row_received
+           & std_logic_vector(table_id) & "00" & std_logic_vector(table_words)
+           & x"00" & map_count
+           & x"00" & errors & error_count
+           & tiles_done & tiles_dropped
+           & tile_clocks
+           & window_errors & failed_tile;
+
+  g_bytes : for i in 0 to 51 generate
+    word_bytes(i) <= words(415 - 8 * i downto 408 - 8 * i);
+  end generate g_bytes;
+
+  g_no_bytes : for i in 52 to 63 generate
+    word_bytes(i) <= (others => '-');
+  end generate g_no_bytes;
+
+  own_word   <= to_bit(out_word(0) = '1' and out_word(1) = '0' and msg_type = C_OPEN and code = C_OK); -- the token
+  byte_index <= out_word(3 downto 0) & out_byte;
+  list_index <= body_index & out_byte;
+
+  p_data <= f_data when state = st_cells
+            else r_data when is_icmp = '1'
+            else head_byte when in_header = '1' and is_map = '0' and own_word = '0'
+            else list_byte when is_list = '1'
+            else word(7 downto 0) when in_bitmap = '1'
+            else word_bytes(to_integer(byte_index));
 
   -- Header of a reply: the request's bytes, but version, type, code and a zero (and OPEN's token).
-  p_head : process (out_word, out_byte, r_data, msg_type, code, word)
+  p_head : process (out_word, out_byte, r_data, msg_type, code)
   begin
     head_byte <= r_data;
     if out_word = 0 and out_byte = 2 then
       head_byte <= x"01";
     elsif out_word = 0 and out_byte = 3 then
       head_byte <= msg_type or x"80";
-    elsif out_word = 1 and msg_type = C_OPEN and code = C_OK then
-      head_byte <= word(31 downto 24);
     elsif out_word = 2 and out_byte = 2 then
       head_byte <= "00000" & code;
     elsif out_word = 2 and out_byte = 3 then
@@ -456,16 +470,24 @@ begin
     end if;
   end process p_head;
 
+  list_byte <= c_data(31 downto 24) when msg_type(2) = '1' and out_byte = 0
+               else c_data(23 downto 16) when msg_type(2) = '1' and out_byte = 1
+               else c_data(15 downto 8) when msg_type(2) = '1' and out_byte = 2
+               else c_data(7 downto 0) when msg_type(2) = '1'
+               else own_mac(47 downto 40) when body_index = 14 and out_byte = 2
+               else own_mac(39 downto 32) when body_index = 14 and out_byte = 3
+               else own_mac(31 downto 24) when body_index = 15 and out_byte = 0
+               else own_mac(23 downto 16) when body_index = 15 and out_byte = 1
+               else own_mac(15 downto 8) when body_index = 15 and out_byte = 2
+               else own_mac(7 downto 0) when body_index = 15
+               else C_INFO_BYTES(to_integer(list_index));
+
   p_valid <= f_valid when state = st_cells else to_bit(state = st_show);
   p_last  <= f_last when state = st_cells else at_end and not is_map;
-  p_data  <= f_data when state = st_cells
-             else r_data when is_icmp = '1'
-             else head_byte when in_header = '1' and is_map = '0'
-             else word(31 downto 24);
 
-  -- A word is loaded with its first byte, three clocks after its number (when a counter may take longer), or bit by bit.
-  fetched   <= to_bit(step = 33) when in_bitmap = '1' and out_byte = 0 and is_map = '0' and is_icmp = '0'
-               else to_bit(step >= 3) and (c_valid or in_header or to_bit(msg_type /= C_COUNTERS) or is_map or is_icmp);
+  -- A byte is there three clocks after its number (later if a counter takes longer), one of the bitmap after its bits.
+  fetched <= to_bit(step = 9) when in_bitmap = '1' and is_icmp = '0'
+             else to_bit(step >= 3) and (c_valid or not is_list or not msg_type(2));
 
   -- The one process of the sequence ----------------------------------------------------------------------------------
   p_sequence : process (clk)
@@ -505,20 +527,16 @@ begin
         quiet_ms <= quiet_ms - 1;
       end if;
 
-      -- The shift register, both ways.
       if have = '1' then
         word <= word_next;
-      elsif state = st_fetch and in_bitmap = '1' and is_map = '0' and out_byte = 0 then
-        word <= word(30 downto 0) & b_bit; -- the first ones fall out again
-      elsif state = st_fetch and out_byte = 0 and fetched = '1' then
-        word <= body_word;
-      elsif state = st_show and p_ready = '1' then
-        word <= word(23 downto 0) & x"00";
+      elsif state = st_fetch then
+        word(7 downto 0) <= word(6 downto 0) & b_bit; -- the first ones fall out again
       end if;
 
       if state = st_idle then
         is_map     <= '0';
         is_icmp    <= '0';
+        lists      <= '0';
         use_bank_1 <= '0';
         silent     <= '0';
         by_timer   <= '0';
@@ -574,6 +592,7 @@ begin
 
       elsif state = st_decide then
         index     <= unsigned(word(15 downto 0));
+        of_map    <= is_last;
         pos       <= to_unsigned(C_ARGUMENTS, 11);
         words_end <= to_unsigned(C_ARGUMENTS + 3, 11);
         state     <= st_wait;
@@ -587,6 +606,7 @@ begin
           code       <= C_BAD_MESSAGE;
         elsif msg_type = C_INFO or msg_type = C_COUNTERS then
           out_end <= to_unsigned(C_TABLE_END, C_OUT_W);
+          lists   <= '1';
         elsif msg_type = C_OPEN then
           v_go := '1';
         elsif open_q = '0' then
@@ -623,7 +643,7 @@ begin
             if long_1 = '0' or end_pos(1 downto 0) /= 2 then
               events(16) <= '1';
               code       <= C_BAD_MESSAGE;
-            elsif unsigned(word(31 downto 16)) = table_id then
+            elsif is_last = '1' then
               if unsigned(word(15 downto 0)) > table_words or table_id = 0 then
                 code <= C_ORDER;
               elsif idle_chip = '0' then
@@ -631,7 +651,7 @@ begin
               else
                 state <= st_words;
               end if;
-            elsif unsigned(word(31 downto 16)) = table_id + 1 and unsigned(word(15 downto 0)) = 0 then
+            elsif is_next = '1' and unsigned(word(15 downto 0)) = 0 then
               if idle_chip = '0' then
                 code <= C_NOT_READY;
               else
@@ -668,7 +688,7 @@ begin
               state   <= st_check;
             end if;
           elsif msg_type = C_RELEASE then
-            if unsigned(word(31 downto 16)) /= map_tile then
+            if is_last = '0' then
               code <= C_ORDER;
             elsif map_busy = '1' and map_complete = '0' then
               code <= C_NOT_READY;
@@ -704,7 +724,7 @@ begin
             read_left   <= unsigned(word_next(31 downto 16));
             read_active <= to_bit(unsigned(word_next(31 downto 16)) /= 0);
             settle      <= (others => '1');
-            if read_tile = map_tile then
+            if of_map = '1' then
               keep <= word_next(15 downto 0);
             end if;
           elsif msg_type = C_SET then
