@@ -17,4 +17,5 @@ reset_sync.vhd
 ram_dc.vhd
 async_fifo.vhd
 packet_rx.vhd
+packet_tx.vhd
 responder.vhd

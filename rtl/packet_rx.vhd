@@ -1,28 +1,30 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- packet_rx: frames of the MAC -> messages for the responder: ARP requests, ICMP echo requests, UDP to one port.
---   Input     : bytes behind the SFD, FCS included; then one beat with s_last whose s_data is the MAC's verdict (mac_rx;
---               0 = good: at least 64, at most 1518 bytes, FCS right). s_ready is low in the one clock behind a verdict
---   Accepts   : destination own_mac or broadcast. ARP (RFC 826): Ethernet, IPv4, request, target own_ip. IPv4 (RFC 791):
---               header of 5 words, total length at least 28 and within the frame, header checksum, not a fragment,
---               destination own_ip; with ICMP (RFC 792): type 8, code 0, checksum over the message; or with UDP (RFC
---               768): port G_UDP_PORT, length = total length - 20, checksum (0: none). What lies behind the IP packet
---               (padding, FCS) is not looked at
---   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP), m_length (ICMP: bytes from frame byte 34 on, UDP: payload, from
---               byte 42 on; ARP: 0) of the oldest message, until m_done; its frame through r_addr, r_data (1 clock)
+--   Input     : bytes behind the SFD, FCS included; then one beat with s_last whose s_data is the MAC's verdict
+--               (mac_rx; 0 = good: at least 64, at most 1518 bytes, FCS right). s_ready is low in the one clock behind
+--               a verdict
+--   Accepts   : destination own_mac or broadcast. ARP (RFC 826): Ethernet, IPv4, request, target own_ip. IPv4 (RFC
+--               791): header of 5 words, total length at least 28 and within the frame, header checksum, not a
+--               fragment, destination own_ip; with ICMP (RFC 792): type 8, code 0, checksum over the message; or with
+--               UDP (RFC 768): port G_UDP_PORT, length = total length - 20, checksum (0: none). What lies behind the
+--               IP packet (padding, FCS) is not looked at
+--   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP), m_length (ICMP: bytes from frame byte 34 on, UDP: payload,
+--               from byte 42 on; ARP: 0) of the oldest message, until m_done; its frame through r_addr, r_data (1
+--               clock)
 --   Slots     : G_SLOTS frames. Bytes are stored as they come, and a frame becomes a message at its verdict only. Its
 --               slot must be free at its first byte. Addresses wrap within the slot, whatever the input
---   Events    : bit n = counter n of docs/protocol.md, one pulse a frame two clocks behind its verdict, a message two (0
---               and its kind). Order: the MAC's verdict (8, 5, 4, 3, 2, 1), 6 destination MAC, 9 ethertype or ARP, 10
---               IP header, 11 fragment, 9 protocol, port or ICMP type, 12 UDP length or checksum, 7 no slot
+--   Events    : bit n = counter n of docs/protocol.md, one pulse a frame two clocks behind its verdict, a message two
+--               (0 and its kind). Order: the MAC's verdict (8, 5, 4, 3, 2, 1), 6 destination MAC, 9 ethertype or ARP,
+--               10 IP header, 11 fragment, 9 protocol, port or ICMP type, 12 UDP length or checksum, 7 no slot
 --   Latency   : m_valid 4 clocks behind the verdict
 --   Structure : one position counter. It starts at -34, so that it counts the bytes behind the IP header without a
---               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and a
---               bit that sticks remembers the class of what differed.
---               Sums: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits for
---               the next byte, whichever half that is. One for the IP header; one for ICMP, or for UDP with addresses,
---               total length and a constant in place of the pseudo header (17 + length = total length - 3). Both
---               are right when all ones; the bytes behind the end add nothing, but settle the carry.
---               Whatever is past the end of the IP packet must be 4 bytes at least, the FCS: else the length was wrong
+--               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and
+--               a bit that sticks remembers the class of what differed.
+--               Sums: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits
+--               for the next byte, whichever half that is. One for the IP header; one for ICMP, or for UDP with
+--               addresses, total length and a constant in place of the pseudo header (17 + length = total length - 3).
+--               Both are right when all ones; the bytes behind the end add nothing, but settle the carry. Whatever is
+--               past the end of the IP packet must be 4 bytes at least, the FCS: else the length was wrong
 --   Reset     : no message, next byte is the first of a frame; RAM and data registers have no reset
 --   Golden    : sw/golden/packet_rx.hpp
 library ieee;

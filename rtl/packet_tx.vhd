@@ -1,0 +1,418 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- packet_tx: ARP reply (RFC 826), ICMP echo reply (RFC 792) or UDP packet (RFC 768) in a frame slot of mac_tx.
+--   Input     : s_start (pulse, only while s_ready) with s_kind 0 ARP, 1 ICMP, 2 UDP, and the peer's bank; then the
+--               payload, 1 .. 1472 bytes with p_last (ICMP: from frame byte 38 on, UDP: from 42 on; ARP: none), with
+--               any gaps. The peer's bytes (0-5 MAC, 6-9 IP, 10-11 UDP port) stand still from s_start until s_ready
+--   Output    : the frame without padding and FCS, at slot & byte of ram_dc; then f_request of the slot flips. Slots
+--               take turns. IPv4 (RFC 791): id 0, do not fragment, TTL 64. UDP from port G_UDP_PORT, checksum 0 sent
+--               as 0xffff
+--   Events    : ev_sent, ev_excessive, ev_late: one pulse when f_done of a slot comes back
+--   Time      : a clock for each byte of the payload, then 170 clocks (ICMP: 154)
+--   Structure : the payload goes first, so that all lengths are known when the header is written. The header is walked
+--               through four times: written and summed for UDP; UDP or ICMP checksum written; summed for IP; IP
+--               checksum written. So there is one sum, nothing is patched, and the walk has no jumps. A byte of the
+--               header comes from: constants, own addresses and lengths, the peer's memory, the sum. The lower bits of
+--               the byte number address the peer's memory.
+--               Sum: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits for
+--               the next byte. UDP sums bytes 14-23, 26-39 and, in place of the IP checksum, a constant that turns the
+--               former into the pseudo header
+--   Crossing  : f_done through cdc_sync; f_result stands still beside it
+--   Reset     : both slots free, mac_tx must be reset, too; data registers have no reset
+--   Golden    : sw/golden/packet_tx.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity packet_tx is
+  generic (
+    G_UDP_PORT : integer := 20563 -- 1 .. 65535
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    own_mac : in  std_logic_vector(47 downto 0); -- first byte on the wire on the left; static
+    own_ip  : in  std_logic_vector(31 downto 0);
+
+    s_ready : out std_logic;
+    s_start : in  std_logic;
+    s_kind  : in  std_logic_vector(1 downto 0);
+    s_bank  : in  std_logic;
+
+    p_valid : in  std_logic;
+    p_ready : out std_logic;
+    p_data  : in  std_logic_vector(7 downto 0);
+    p_last  : in  std_logic;
+
+    peer_we    : in  std_logic;
+    peer_bank  : in  std_logic;
+    peer_index : in  std_logic_vector(3 downto 0);
+    peer_data  : in  std_logic_vector(7 downto 0);
+
+    ram_we    : out std_logic;
+    ram_waddr : out std_logic_vector(11 downto 0);
+    ram_wdata : out std_logic_vector(7 downto 0);
+
+    f_request  : out std_logic_vector(1 downto 0);
+    f_length_0 : out std_logic_vector(10 downto 0);
+    f_length_1 : out std_logic_vector(10 downto 0);
+    f_done     : in  std_logic_vector(1 downto 0); -- of tx_clk
+    f_result_0 : in  std_logic_vector(1 downto 0);
+    f_result_1 : in  std_logic_vector(1 downto 0);
+
+    ev_sent      : out std_logic;
+    ev_excessive : out std_logic;
+    ev_late      : out std_logic
+  );
+end entity packet_tx;
+
+architecture rtl of packet_tx is
+
+  constant C_PORT : unsigned(15 downto 0) := to_unsigned(G_UDP_PORT mod 65536, 16);
+  -- UDP's sum has 0x4500, 0x4000, 0x4011 and the total length; it needs 17 and the total length - 20.
+  constant C_PSEUDO : std_logic_vector(15 downto 0) := x"3aeb";
+
+  -- What is being done, one after the other: nothing; payload; one clock; header.
+  signal busy    : std_logic;
+  signal paying  : std_logic;
+  signal turning : std_logic;
+  signal walking : std_logic;
+  signal finish  : std_logic;
+
+  signal arp  : std_logic;
+  signal udp  : std_logic;
+  signal icmp : std_logic;
+  signal bank : std_logic;
+  signal slot : std_logic;
+  signal size : unsigned(10 downto 0); -- of the frame so far
+
+  -- Walk: byte of the header, and the four times.
+  signal place : unsigned(5 downto 0);
+  signal round : unsigned(1 downto 0);
+  signal last  : std_logic;
+
+  -- Sources of the byte.
+  signal lengths     : unsigned(10 downto 0);
+  signal length_byte : std_logic_vector(7 downto 0);
+  signal mac_byte    : std_logic_vector(7 downto 0);
+  signal ip_place    : unsigned(1 downto 0);
+  signal ip_byte     : std_logic_vector(7 downto 0);
+  signal fixed_byte  : std_logic_vector(7 downto 0);
+  signal peer_waddr  : std_logic_vector(4 downto 0);
+  signal peer_raddr  : std_logic_vector(4 downto 0);
+  signal peer_byte   : std_logic_vector(7 downto 0);
+
+  -- One clock later: where it goes.
+  signal at_checksum  : std_logic;
+  signal way_step     : std_logic;
+  signal way_we       : std_logic;
+  signal way_place    : unsigned(5 downto 0);
+  signal way_peer     : std_logic;
+  signal way_checksum : std_logic;
+  signal way_no_zero  : std_logic; -- a checksum that must not be zero
+  signal way_byte     : std_logic_vector(7 downto 0);
+  signal way_add      : std_logic;
+  signal way_clear    : std_logic;
+  signal data         : std_logic_vector(7 downto 0);
+
+  signal take   : std_logic;
+  signal step   : std_logic;
+  signal addend : std_logic_vector(7 downto 0);
+  signal total  : unsigned(9 downto 0);
+  signal sum    : unsigned(15 downto 0);
+  signal carry  : std_logic;
+
+  -- Slots.
+  signal request   : std_logic_vector(1 downto 0);
+  signal done      : std_logic_vector(1 downto 0);
+  signal done_seen : std_logic_vector(1 downto 0);
+  signal change    : std_logic_vector(1 downto 0);
+  signal result    : std_logic_vector(1 downto 0);
+
+begin
+
+  assert G_UDP_PORT >= 1 and G_UDP_PORT <= 65535
+    report "packet_tx: G_UDP_PORT=" & integer'image(G_UDP_PORT) & " outside 1..65535"
+    severity failure;
+
+  -- Control -----------------------------------------------------------------------------------------------------------
+  icmp    <= not arp and not udp;
+  take    <= paying and p_valid;
+  p_ready <= paying;
+  last    <= to_bit(place = 41) or (icmp and to_bit(place = 37)); -- the ICMP payload begins at 38
+  finish  <= last and to_bit(round = 3);
+
+  p_control : process (clk)
+  begin
+    if rising_edge(clk) then
+      turning <= (s_start and to_bit(s_kind = "00")) or (take and p_last);
+      if s_start = '1' then
+        busy   <= '1';
+        paying <= to_bit(s_kind /= "00");
+        arp    <= to_bit(s_kind = "00");
+        udp    <= s_kind(1);
+        bank   <= s_bank;
+        size   <= to_unsigned(42, 11);
+        if s_kind = "01" then
+          size <= to_unsigned(38, 11);
+        end if;
+      elsif take = '1' then
+        size   <= size + 1;
+        paying <= not p_last;
+      end if;
+
+      if turning = '1' then
+        walking <= '1';
+      end if;
+      if walking = '1' then
+        place <= place + 1;
+        if last = '1' then
+          place <= (others => '0');
+          round <= round + 1;
+        end if;
+        -- The latest byte was written long ago.
+        if finish = '1' then
+          busy    <= '0';
+          walking <= '0';
+        end if;
+      end if;
+
+      if rst = '1' then
+        busy    <= '0';
+        paying  <= '0';
+        turning <= '0';
+        walking <= '0';
+        place   <= (others => '0');
+        round   <= (others => '0');
+      end if;
+    end if;
+  end process p_control;
+
+  -- Sources -----------------------------------------------------------------------------------------------------------
+  -- Frame byte 16: IP total length; 38: UDP length.
+  lengths     <= size - 34 when place(5) = '1' else
+                 size - 14;
+  length_byte <= "00000" & std_logic_vector(lengths(10 downto 8)) when place(0) = '0' else
+                 std_logic_vector(lengths(7 downto 0));
+
+  -- Frame bytes 6 and, in ARP, 22.
+  p_mac_byte : process (own_mac, place)
+  begin
+    if place(2 downto 0) = "110" then
+      mac_byte <= own_mac(47 downto 40);
+    elsif place(2 downto 0) = "111" then
+      mac_byte <= own_mac(39 downto 32);
+    elsif place(1 downto 0) = "00" then
+      mac_byte <= own_mac(31 downto 24);
+    elsif place(1 downto 0) = "01" then
+      mac_byte <= own_mac(23 downto 16);
+    elsif place(1 downto 0) = "10" then
+      mac_byte <= own_mac(15 downto 8);
+    else
+      mac_byte <= own_mac(7 downto 0);
+    end if;
+  end process p_mac_byte;
+
+  -- Frame bytes 26 or, in ARP, 28.
+  ip_place <= (place(1) xor not arp) & place(0);
+
+  p_ip_byte : process (own_ip, ip_place)
+  begin
+    if ip_place = "00" then
+      ip_byte <= own_ip(31 downto 24);
+    elsif ip_place = "01" then
+      ip_byte <= own_ip(23 downto 16);
+    elsif ip_place = "10" then
+      ip_byte <= own_ip(15 downto 8);
+    else
+      ip_byte <= own_ip(7 downto 0);
+    end if;
+  end process p_ip_byte;
+
+  -- Zero where nothing else is said.
+  p_fixed_byte : process (place, arp, udp)
+  begin
+    fixed_byte <= (others => '0');
+    if place = 12 then
+      fixed_byte <= x"08";
+    elsif place = 13 then
+      fixed_byte <= "00000" & arp & arp & '0';
+    elsif place = 14 then
+      if arp = '0' then
+        fixed_byte <= x"45";
+      end if;
+    elsif place = 15 then
+      fixed_byte <= "0000000" & arp;
+    elsif place = 16 then
+      fixed_byte <= x"08";
+    elsif place = 18 then
+      fixed_byte <= "00000" & arp & arp & '0';
+    elsif place = 19 then
+      fixed_byte <= "00000" & arp & "00";
+    elsif place = 20 then
+      fixed_byte <= '0' & not arp & "000000";
+    elsif place = 21 then
+      fixed_byte <= "000000" & arp & '0';
+    elsif place = 22 then
+      fixed_byte <= x"40";
+    elsif place = 23 then
+      fixed_byte <= "000" & udp & "0001";
+    elsif place = 24 then
+      fixed_byte <= C_PSEUDO(15 downto 8);
+    elsif place = 25 then
+      fixed_byte <= C_PSEUDO(7 downto 0);
+    elsif place = 34 then
+      if udp = '1' then
+        fixed_byte <= std_logic_vector(C_PORT(15 downto 8));
+      end if;
+    elsif place = 35 then
+      if udp = '1' then
+        fixed_byte <= std_logic_vector(C_PORT(7 downto 0));
+      end if;
+    elsif place >= 40 then
+      fixed_byte <= x"ff";
+    end if;
+  end process p_fixed_byte;
+
+  -- Peer: frame bytes 0 and, in ARP, 32 (MAC), 30 or 38 (IP): their lower bits are the index. 36 (port) would be index
+  -- 12, where it is kept.
+  peer_waddr <= peer_bank & peer_index(3) & (peer_index(2) or (peer_index(3) and peer_index(1))) &
+                (peer_index(1) and not peer_index(3)) & peer_index(0);
+  peer_raddr <= bank & (place(5) and (place(3) or not arp)) & std_logic_vector(place(2 downto 0));
+
+  u_peers : entity work.ram_sdp
+    generic map (
+      G_DATA_W  => 8,
+      G_DEPTH   => 32,
+      G_LATENCY => 1
+    )
+    port map (
+      clk   => clk,
+      we    => peer_we,
+      waddr => peer_waddr,
+      wdata => peer_data,
+      raddr => peer_raddr,
+      rdata => peer_byte
+    );
+
+  -- Round 1 writes the checksum of UDP or ICMP, round 3 that of IP.
+  at_checksum <= round(0) and not arp and
+                 ((round(1) and to_bit(place(5 downto 1) = 12)) or
+                  (not round(1) and ((udp and to_bit(place(5 downto 1) = 20)) or
+                                     (not udp and to_bit(place(5 downto 1) = 18)))));
+
+  p_way : process (clk)
+  begin
+    if rising_edge(clk) then
+      way_step     <= walking and not rst;
+      way_we       <= walking and not rst and (to_bit(round = 0) or at_checksum);
+      way_place    <= place;
+      way_checksum <= at_checksum;
+      way_no_zero  <= udp and not round(1);
+      way_clear    <= to_bit(round = 2 and place = 0);
+      if round = 0 then
+        way_add <= udp and to_bit(place >= 14 and place <= 39);
+      else
+        way_add <= to_bit(round = 2 and place >= 14 and place <= 33 and place /= 24 and place /= 25);
+      end if;
+
+      if arp = '1' then
+        way_peer <= to_bit(place <= 5 or place >= 32);
+      else
+        way_peer <= to_bit(place <= 5 or (place >= 30 and place <= 33) or place = 36 or place = 37);
+      end if;
+      if place(5 downto 1) = 3 or place(5 downto 2) = 2 or
+         (arp = '1' and (place(5 downto 1) = 11 or place(5 downto 2) = 6)) then
+        way_byte <= mac_byte;
+      elsif (arp = '0' and (place(5 downto 1) = 13 or place(5 downto 1) = 14)) or
+            (arp = '1' and place(5 downto 2) = 7) then
+        way_byte <= ip_byte;
+      elsif arp = '0' and (place(5 downto 1) = 8 or place(5 downto 1) = 19) then
+        way_byte <= length_byte;
+      else
+        way_byte <= fixed_byte;
+      end if;
+    end if;
+  end process p_way;
+
+  -- Round 1 and 3 begin with zeros, so that no carry is left when the checksum is written. 40 and 41 are written in
+  -- round 0, too, as 0xffff: what UDP has in place of zero.
+  data <= p_data when paying = '1' else
+          peer_byte when way_peer = '1' and way_checksum = '0' else
+          way_byte when way_checksum = '0' or (way_no_zero = '1' and sum = x"ffff") else
+          std_logic_vector(not sum(15 downto 8));
+
+  ram_we    <= take or way_we;
+  ram_waddr <= slot & std_logic_vector(size) when paying = '1' else
+               slot & "00000" & std_logic_vector(way_place);
+  ram_wdata <= data;
+
+  -- Sum ---------------------------------------------------------------------------------------------------------------
+  -- After an odd number of bytes one zero more.
+  step   <= take or (turning and size(0)) or way_step;
+  addend <= data when paying = '1' or way_add = '1' else
+            (others => '0');
+  total  <= ('0' & sum(15 downto 8) & '1') + ('0' & unsigned(addend) & carry);
+
+  p_sum : process (clk)
+  begin
+    if rising_edge(clk) then
+      if step = '1' then
+        sum   <= sum(7 downto 0) & total(8 downto 1);
+        carry <= total(9);
+      end if;
+      if busy = '0' or way_clear = '1' then
+        sum   <= (others => '0');
+        carry <= '0';
+      end if;
+    end if;
+  end process p_sum;
+
+  -- Slots -------------------------------------------------------------------------------------------------------------
+  s_ready   <= not busy and not (request(0) xor done(0)) when slot = '0' else
+               not busy and not (request(1) xor done(1));
+  f_request <= request;
+
+  u_done : entity work.cdc_sync
+    generic map (
+      G_WIDTH => 2
+    )
+    port map (
+      clk => clk,
+      d   => f_done,
+      q   => done
+    );
+
+  change <= done xor done_seen;
+  result <= f_result_0 when change(0) = '1' else
+            f_result_1;
+
+  p_slots : process (clk)
+  begin
+    if rising_edge(clk) then
+      if walking = '1' and finish = '1' then
+        slot <= not slot;
+        if slot = '0' then
+          request(0) <= not request(0);
+          f_length_0 <= std_logic_vector(size);
+        else
+          request(1) <= not request(1);
+          f_length_1 <= std_logic_vector(size);
+        end if;
+      end if;
+      done_seen    <= done;
+      ev_sent      <= (change(0) or change(1)) and to_bit(result = "00");
+      ev_excessive <= (change(0) or change(1)) and to_bit(result = "01");
+      ev_late      <= (change(0) or change(1)) and to_bit(result = "10");
+      if rst = '1' then
+        slot         <= '0';
+        request      <= "00";
+        ev_sent      <= '0';
+        ev_excessive <= '0';
+        ev_late      <= '0';
+      end if;
+    end if;
+  end process p_slots;
+
+end architecture rtl;
