@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "net/client.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace psweep::net {
+namespace {
+
+constexpr double kFirstPatience = 0.3;   // before anything was measured
+constexpr double kLeastPatience = 0.01;  // the host's own scheduling
+constexpr double kMostPatience = 0.5;    // so that a cable put back is noticed soon (or 4 round trips)
+constexpr double kBusyPause = 0.25;      // between two OPEN at a busy chip
+
+std::string seconds(double s) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f s", s);
+  return text;
+}
+
+std::vector<uint32_t> words_of(const Bytes& packet) {
+  std::vector<uint32_t> words((packet.size() - kHeaderBytes) / 4);
+  for (size_t i = 0; i < words.size(); ++i) words[i] = get32(packet, kHeaderBytes + 4 * i);
+  return words;
+}
+
+}  // namespace
+
+const char* type_name(uint8_t type) {
+  static const char* const names[] = {"-",     "OPEN",  "CLOSE", "INFO", "COUNTERS", "STATUS",
+                                      "TABLE", "START", "WRITE", "READ", "RELEASE",  "SET"};
+  return type < std::size(names) ? names[type] : type == kMap ? "MAP" : "-";
+}
+
+const char* code_name(uint8_t code) {
+  static const char* const names[] = {"ok", "busy", "no session", "bad message", "order", "not ready"};
+  return code < std::size(names) ? names[code] : "unknown code";
+}
+
+std::optional<Capabilities> parse_info(const std::vector<uint32_t>& w) {
+  if (w.size() != kInfoWords || w[0] != (uint32_t{kVersion} << 16 | kInfoWords)) return std::nullopt;
+  Capabilities c;
+  golden::Config& e = c.config.engine;
+  bool good = true;
+  auto take = [&](int word, uint32_t lo, uint32_t hi) {
+    good = good && w[word] >= lo && w[word] <= hi;
+    return static_cast<int>(std::min(w[word], hi));
+  };
+  e.img_cols = take(1, 1, 4096);
+  e.img_rows = take(2, 1, 4096);
+  e.plane_cols = take(3, 1, 4096);
+  e.plane_rows = take(4, 1, 4096);
+  e.planes = take(5, 1, 1024);
+  e.window = take(6, 1, 21);
+  e.pix_bits = take(7, 1, 12);
+  e.weight_bits = take(8, 1, 12);
+  e.interp_frac = take(9, 0, 8);
+  e.mncc_bits = take(10, 4, 16);
+  e.frac_bits = take(11, 2, 12);
+  e.lanes = take(12, 1, 64);
+  c.mac = uint64_t{w[14] & 0xffff} << 32 | w[15];
+  c.config.clk_khz = take(16, 1, 10000000);
+  c.config.chunk_bytes = take(17, 16, 1440);
+  c.config.row_slots = take(20, 2, 1024);
+  c.config.map_depth = take(23, 1, 1u << 24);
+  c.config.session_ms = take(24, 1, 65535);
+  c.config.rx_slots = take(25, 1, 4096);
+  c.counters = take(26, 0, kCounterWords);
+  // What follows from the others must follow: chip and host cut rows and cells into the same chunks.
+  good =
+      good && w[13] == static_cast<uint32_t>(c.config.cell_bits()) &&
+      w[18] == static_cast<uint32_t>(c.config.pair_bytes()) && w[19] == static_cast<uint32_t>(c.config.chunk_pairs()) &&
+      w[21] == static_cast<uint32_t>(c.config.cell_bytes()) && w[22] == static_cast<uint32_t>(c.config.chunk_cells());
+  if (!good) return std::nullopt;
+  return c;
+}
+
+bool same_capabilities(const ArbiterConfig& a, const ArbiterConfig& b) {
+  auto key = [](const ArbiterConfig& c) {
+    const golden::Config& e = c.engine;
+    return std::vector<int>{e.img_cols,  e.img_rows, e.plane_cols,  e.plane_rows,  e.planes,
+                            e.window,    e.pix_bits, e.weight_bits, e.interp_frac, e.mncc_bits,
+                            e.frac_bits, e.lanes,    c.chunk_bytes, c.row_slots,   c.map_depth};
+  };
+  return key(a) == key(b);
+}
+
+std::optional<Status> parse_status(const std::vector<uint32_t>& w) {
+  if (w.size() < kStatusWords) return std::nullopt;
+  auto hi = [&](int i) { return static_cast<uint16_t>(w[i] >> 16); };
+  auto lo = [&](int i) { return static_cast<uint16_t>(w[i]); };
+  Status s;
+  s.row_tile = hi(0), s.flags = lo(0);
+  s.engine_tile = hi(1), s.map_tile = lo(1);
+  s.base = hi(2), s.received = lo(2);
+  s.table = hi(3), s.table_words = lo(3);
+  s.cells = w[4];
+  s.errors = hi(5), s.error_count = lo(5);
+  s.tiles_done = hi(6), s.tiles_dropped = lo(6);
+  s.tile_clocks = w[7];
+  s.window_errors = hi(8), s.failed_tile = lo(8);
+  s.bitmap.assign(w.begin() + kStatusWords, w.end());
+  return s;
+}
+
+Client::Client(Transport& transport, double timeout, uint64_t seed)
+    : transport_(transport), timeout_(timeout), random_state_(seed), sent_(65536) {
+  sequence_ = static_cast<uint16_t>(random());
+  heard_ = asked_ = now();
+}
+
+uint64_t Client::random() {  // splitmix64
+  uint64_t z = random_state_ += 0x9e3779b97f4a7c15;
+  z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
+  z = (z ^ z >> 27) * 0x94d049bb133111eb;
+  return z ^ z >> 31;
+}
+
+double Client::patience() const {
+  const double once = has_rtt_ ? std::max(kLeastPatience, statistics_.rtt + 4 * rtt_variation_) : kFirstPatience;
+  return std::min(once * backoff_, std::max({once, kMostPatience, 4 * statistics_.rtt}));
+}
+
+void Client::silence() {
+  ++statistics_.timeouts;
+  backoff_ = std::min(backoff_ * 2, 1024.0);
+}
+
+void Client::check_silence(const std::string& outstanding) {
+  const double silent = silent_for();
+  if (silent <= timeout_) return;
+  std::string text = where() + ": no valid answer for " + seconds(silent) + "; outstanding: " + outstanding;
+  if (!transport_.complaint().empty()) text += " (" + transport_.complaint() + ")";
+  throw LinkError(text);
+}
+
+uint64_t Client::send(Type type, uint16_t tile, uint16_t index, const Bytes& payload, uint8_t flags) {
+  Sent& s = sent_[++sequence_];
+  s = Sent{};
+  s.order = ++order_;
+  s.type = type;
+  // Those that need no session carry no token, so that their replies are recognised after it has changed.
+  s.token = type == kOpen || type == kInfo || type == kCounters ? 0 : token_;
+  s.tile = tile;
+  s.index = index;
+  s.count = type == kRead && payload.size() >= 2 ? static_cast<uint16_t>(get16(payload, 0)) : 0;
+  s.time = now();
+  Header h;
+  h.type = type;
+  h.token = s.token;
+  h.sequence = sequence_;
+  h.flags = flags;
+  h.tile = tile;
+  h.index = index;
+  Bytes packet = encode(h);
+  packet.resize(kHeaderBytes + payload.size());
+  std::copy(payload.begin(), payload.end(), packet.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes));
+  ++statistics_.packets_sent;
+  statistics_.bytes_sent += packet.size();
+  transport_.send(packet);
+  return s.order;
+}
+
+std::optional<Event> Client::receive(double timeout_s) {
+  const double until = now() + std::max(0.0, timeout_s);
+  for (;;) {
+    const auto packet = transport_.receive(std::max(0.0, until - now()));
+    if (!packet) return std::nullopt;
+    if (auto event = take(*packet)) return event;
+    if (now() >= until) return std::nullopt;  // a flood of rubbish must not keep the caller from its timers
+  }
+}
+
+std::optional<Event> Client::take(const Bytes& packet) {
+  ++statistics_.packets_received;
+  statistics_.bytes_received += packet.size();
+  const auto h = decode(packet);
+  if (!h || (h->type & kReply) == 0) {
+    ++statistics_.malformed;
+    return std::nullopt;
+  }
+  Sent& sent = sent_[h->sequence];
+  if (sent.order == 0) {
+    ++statistics_.foreign;
+    return std::nullopt;
+  }
+  if (h->type == kMap) return take_map(packet, *h, sent);
+  const bool opened = sent.type == kOpen && h->flags == kOk;
+  if (h->type != (sent.type | kReply) || h->tile != sent.tile || h->index != sent.index ||
+      (opened ? h->token == 0 : h->token != sent.token)) {
+    ++statistics_.foreign;
+    return std::nullopt;
+  }
+  Reply r;
+  r.type = sent.type;
+  r.code = h->flags;
+  r.tile = sent.tile;
+  r.index = sent.index;
+  r.order = sent.order;
+  r.token = h->token;
+  if (packet.size() % 4 != 0 || h->flags > kNotReady) {
+    ++statistics_.malformed;
+    return std::nullopt;
+  }
+  r.words = words_of(packet);
+  bool good;
+  if (sent.type == kInfo) {
+    good = r.code == kOk && parse_info(r.words).has_value();
+  } else if (sent.type == kCounters) {
+    good = r.code == kOk && r.words.size() == kCounterWords;
+  } else {
+    r.status = parse_status(r.words);
+    good = r.status.has_value() &&
+           (!capabilities_ || r.words.size() == static_cast<size_t>(kStatusWords) +
+                                                    (static_cast<size_t>(capabilities_->config.row_slots) + 31) / 32);
+  }
+  if (!good) {
+    ++statistics_.malformed;
+    return std::nullopt;
+  }
+  if (sent.answered) {
+    ++statistics_.duplicates;
+    return std::nullopt;
+  }
+  sent.answered = true;
+  const double trip = std::max(0.0, now() - sent.time);
+  if (!has_rtt_) {
+    statistics_.rtt = statistics_.rtt_min = statistics_.rtt_max = trip;
+    rtt_variation_ = trip / 2;
+    has_rtt_ = true;
+  } else {
+    rtt_variation_ += (std::abs(trip - statistics_.rtt) - rtt_variation_) / 4;
+    statistics_.rtt += (trip - statistics_.rtt) / 8;
+    statistics_.rtt_min = std::min(statistics_.rtt_min, trip);
+    statistics_.rtt_max = std::max(statistics_.rtt_max, trip);
+  }
+  heard_ = now();
+  backoff_ = 1;
+  return r;
+}
+
+std::optional<Event> Client::take_map(const Bytes& packet, const Header& h, Sent& sent) {
+  // sent.type READ, this session's token, within the range asked for.
+  if (sent.type != kRead || h.token != token_ || sent.token != token_ || token_ == 0 || h.tile != sent.tile ||
+      h.index < sent.index || h.index - sent.index >= sent.count || h.flags != kOk) {
+    ++statistics_.foreign;
+    return std::nullopt;
+  }
+  const size_t body = packet.size() - kHeaderBytes;
+  if (!capabilities_ || body == 0 || body % capabilities_->config.cell_bytes() != 0 ||
+      body > static_cast<size_t>(capabilities_->config.chunk_cells()) * capabilities_->config.cell_bytes()) {
+    ++statistics_.malformed;
+    return std::nullopt;
+  }
+  heard_ = now();
+  backoff_ = 1;
+  return MapChunk{h.tile, h.index, sent.order,
+                  Bytes(packet.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes), packet.end())};
+}
+
+Reply Client::request(Type type, uint16_t tile, uint16_t index, const Bytes& payload) {
+  asked_ = now();
+  std::vector<uint64_t> orders;
+  for (;;) {
+    if (!orders.empty()) ++statistics_.resent;
+    orders.push_back(send(type, tile, index, payload));
+    const double until = now() + patience();
+    while (now() < until) {
+      const auto event = receive(until - now());
+      if (!event) break;
+      if (const auto* reply = std::get_if<Reply>(&*event)) {
+        // An answer to any of the repetitions will do.
+        if (std::find(orders.begin(), orders.end(), reply->order) != orders.end()) return *reply;
+      }
+    }
+    silence();
+    // Packets that answer something else do not count here, or a chip that answers all but this would hold us for ever.
+    if (now() - asked_ > timeout_) {
+      heard_ = std::min(heard_, asked_);
+      check_silence(type_name(type) + std::string(", sent ") + std::to_string(orders.size()) + " times");
+    }
+  }
+}
+
+Capabilities Client::info() {
+  const auto c = parse_info(request(kInfo).words);
+  capabilities_ = *c;  // take() has checked
+  return *c;
+}
+
+std::vector<uint32_t> Client::counters() { return request(kCounters).words; }
+
+Status Client::open(const Capabilities& c) {
+  capabilities_ = c;
+  token_ = 0;
+  nonce_ = static_cast<uint32_t>(random());
+  Bytes nonce;
+  append32(nonce, nonce_);
+  const double start = now(), patient = 1.1e-3 * c.config.session_ms + 1;
+  for (;;) {
+    const Reply r = request(kOpen, 0, 0, nonce);
+    if (r.code == kOk) {
+      token_ = r.token;
+      ++statistics_.sessions;
+      return *r.status;
+    }
+    if (r.code != kBusy) throw LinkError(where() + ": OPEN was refused: " + code_name(r.code));
+    if (now() - start > patient) {
+      throw LinkError(where() + ": another host has the session (asked for " + seconds(now() - start) +
+                      "; a silent one would have lost it after " + seconds(1e-3 * c.config.session_ms) + ")");
+    }
+    const double until = now() + kBusyPause;
+    while (now() < until) receive(until - now());
+  }
+}
+
+void Client::close() noexcept {
+  if (token_ == 0) return;
+  try {
+    const double patient = timeout_;
+    timeout_ = std::min(timeout_, 1.0);  // the results are there already
+    try {
+      request(kClose);
+    } catch (const LinkError&) {  // the chip's silence timer does it, too
+    }
+    timeout_ = patient;
+  } catch (...) {
+  }
+  token_ = 0;
+}
+
+}  // namespace psweep::net

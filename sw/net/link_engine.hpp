@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tiles over the link: sends windows, starts tiles, collects maps, with several tiles in work at once. Survives loss,
+// repetition, reordering and corruption of any packet, a pulled cable (shorter than the client's timeout) and a chip
+// that forgot its session or was reset; docs/host.md says how.
+// Errors: LinkError if the chip falls silent, drops a tile or reports samples outside the loaded window.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "golden/storage.hpp"
+#include "net/client.hpp"
+
+namespace psweep::net {
+
+struct LinkTile {
+  golden::TileJob job;
+  golden::Pixels left, right;  // win_cols x win_rows
+};
+
+struct LinkOptions {
+  int in_flight = 2;  // 1: the next tile is sent after the map of this one; 2: as soon as the chip takes it
+  int window = 32;    // chunks of rows under way
+};
+
+struct LinkFigures {
+  uint64_t pixel_bytes = 0, cell_bytes = 0;  // useful ones: every chunk once
+  double seconds = 0;                        // from before the session to after it
+  uint64_t engine_clocks = 0;                // sum of the chip's tile_clocks
+  uint64_t wait_rows_clocks = 0, wait_map_clocks = 0;
+  std::vector<uint32_t> counters_before, counters_after;
+};
+
+// A READ range or window as bytes. Exposed for tests and the link's benchmark.
+Bytes start_payload(const ArbiterConfig& c, const golden::TileJob& job, uint16_t table);
+std::vector<Bytes> row_chunks(const ArbiterConfig& c, const LinkTile& tile);
+Bytes read_payload(uint16_t count, uint16_t keep);
+// One chunk of cells; false if a cell cannot come from this tile.
+bool decode_cells(const ArbiterConfig& c, const golden::TileJob& job, const Bytes& bytes, size_t first,
+                  std::vector<golden::MapCell>& cells);
+// Writes the plane table as table 1 of a fresh session. LinkError if the chip refuses it.
+void write_table(Client& client, const ArbiterConfig& c, const std::vector<golden::PlaneEntry>& table);
+
+// Tiles 0 .. count-1. `input` is called in order, once for each tile and again for those that have to be repeated;
+// `output` once for each, in order; `progress` with cells received. The session is opened and closed here.
+LinkFigures run_link_tiles(Client& client, const Capabilities& chip, const std::vector<golden::PlaneEntry>& table,
+                           int count, const LinkOptions& options, const std::function<LinkTile(int)>& input,
+                           const std::function<void(int, std::vector<golden::MapCell>)>& output,
+                           const std::function<void(uint64_t cells)>& progress);
+
+}  // namespace psweep::net
