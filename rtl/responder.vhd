@@ -260,7 +260,7 @@ architecture rtl of responder is
   signal code       : std_logic_vector(2 downto 0);
   signal silent     : std_logic; -- no reply
   signal end_pos    : unsigned(10 downto 0); -- frame byte behind the message
-  signal words_end  : unsigned(10 downto 0); -- last byte of the arguments
+  signal words_over : std_logic;             -- the byte that passes is the last of the arguments
   signal index      : unsigned(15 downto 0); -- chunk or table word
   signal long_1     : std_logic; -- at least one word of arguments
   signal long_start : std_logic;
@@ -324,7 +324,8 @@ architecture rtl of responder is
   -- Time.
   signal ms_clock   : unsigned(clog2(G_CLK_KHZ) - 1 downto 0);
   signal ms_tick    : std_logic;
-  signal quiet_ms   : unsigned(15 downto 0); -- left until the session ends
+  signal quiet_ms   : unsigned(15 downto 0); -- since the session's host was heard
+  signal heard      : std_logic;
   signal expired    : std_logic;
   signal rows_wait  : unsigned(7 downto 0);
   signal map_wait   : unsigned(7 downto 0);
@@ -354,6 +355,11 @@ begin
   long_1     <= to_bit(end_pos >= C_ARGUMENTS + 4);
   long_start <= to_bit(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
   long_write <= to_bit(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
+
+  -- pos is one ahead.
+  words_over <= to_bit(pos = end_pos) when msg_type = C_TABLE
+                else to_bit(count = 20) when msg_type = C_START
+                else '1';
 
   -- One subtraction for all numbers that have to be in order.
   known    <= last_tile when msg_type = C_START or msg_type = C_WRITE
@@ -520,12 +526,12 @@ begin
       settle <= '0' & settle(3 downto 1);
       if map_started = '1' then
         map_tile <= unsigned(run_tile);
-        keep     <= (others => '0');
         settle   <= (others => '1');
       end if;
       if ms_tick = '1' and expired = '0' then
-        quiet_ms <= quiet_ms - 1;
+        quiet_ms <= quiet_ms + 1;
       end if;
+      heard <= '0';
 
       if have = '1' then
         word <= word_next;
@@ -594,7 +600,6 @@ begin
         index     <= unsigned(word(15 downto 0));
         of_map    <= is_last;
         pos       <= to_unsigned(C_ARGUMENTS, 11);
-        words_end <= to_unsigned(C_ARGUMENTS + 3, 11);
         state     <= st_wait;
         v_go      := '0';
         if magic_ok = '0' or end_pos < C_ARGUMENTS then
@@ -618,7 +623,7 @@ begin
           code       <= C_BUSY;
         else
           v_go     := '1';
-          quiet_ms <= to_unsigned(G_SESSION_MS, 16);
+          heard    <= '1';
         end if;
         if v_go = '1' then
           if msg_type = C_CLOSE then
@@ -638,7 +643,6 @@ begin
               use_bank_1  <= '1';
             end if;
           elsif msg_type = C_TABLE then
-            words_end <= end_pos - 1;
             -- Frame byte 42 is 2 mod 4.
             if long_1 = '0' or end_pos(1 downto 0) /= 2 then
               events(16) <= '1';
@@ -663,7 +667,6 @@ begin
               code <= C_ORDER;
             end if;
           elsif msg_type = C_START then
-            words_end <= to_unsigned(C_ARGUMENTS + 12 + 4 * 18 - 1, 11);
             if long_start = '0' then
               events(16) <= '1';
               code       <= C_BAD_MESSAGE;
@@ -703,7 +706,7 @@ begin
           if count /= 31 then
             count <= count + 1;
           end if;
-          if hpos = words_end then
+          if words_over = '1' then
             have  <= '0';
             state <= st_wait;
           end if;
@@ -718,7 +721,7 @@ begin
               events(17) <= '1';
               code       <= C_BUSY;
             else
-              quiet_ms <= to_unsigned(G_SESSION_MS, 16);
+              heard <= '1';
             end if;
           elsif msg_type = C_READ then
             read_left   <= unsigned(word_next(31 downto 16));
@@ -755,7 +758,7 @@ begin
               code  <= C_ORDER;
               have  <= '0';
               state <= st_wait;
-            elsif hpos = words_end then
+            elsif words_over = '1' then
               row_open  <= '1';
               last_tile <= last_tile + 1;
             end if;
@@ -873,13 +876,8 @@ begin
         stop        <= '1';
         row_clear   <= '1';
         map_clear   <= '1';
-        read_active <= '0';
         open_q      <= not close_q;
-        last_tile   <= (others => '1');
-        map_tile    <= (others => '1');
-        table_id    <= (others => '0');
-        table_words <= (others => '0');
-        quiet_ms    <= to_unsigned(G_SESSION_MS, 16);
+        heard       <= '1';
         events(22)  <= not close_q;
         state       <= st_wait;
         if by_timer = '1' then
@@ -887,16 +885,25 @@ begin
         end if;
       end if;
 
-      if rst = '1' then
-        state       <= st_idle;
-        open_q      <= '0';
-        have        <= '0';
+      -- Written last, and alone, so that they become resets of the flip-flops.
+      if map_started = '1' then
+        keep <= (others => '0');
+      end if;
+      if heard = '1' then
+        quiet_ms <= (others => '0');
+      end if;
+      if rst = '1' or state = st_abort then
         read_active <= '0';
-        duplex_mode <= "00";
         last_tile   <= (others => '1');
         map_tile    <= (others => '1');
         table_id    <= (others => '0');
         table_words <= (others => '0');
+      end if;
+      if rst = '1' then
+        state       <= st_idle;
+        open_q      <= '0';
+        have        <= '0';
+        duplex_mode <= "00";
       end if;
     end if;
   end process p_sequence;
@@ -907,11 +914,8 @@ begin
     if rising_edge(clk) then
       -- x^32 + x^22 + x^2 + x + 1, maximal; which token comes depends on when the host asks.
       dice     <= dice(30 downto 0) & (dice(31) xor dice(21) xor dice(1) xor dice(0));
-      ms_tick  <= to_bit(ms_clock = 0);
-      ms_clock <= ms_clock - 1;
-      if ms_clock = 0 then
-        ms_clock <= to_unsigned(G_CLK_KHZ - 1, ms_clock'length);
-      end if;
+      ms_tick  <= to_bit(ms_clock = G_CLK_KHZ - 1);
+      ms_clock <= ms_clock + 1;
 
       rows_short <= row_busy and not running;
       events(24) <= '0';
@@ -927,16 +931,18 @@ begin
 
       if rst = '1' then
         dice      <= x"5eed1234";
-        ms_clock  <= (others => '0');
         rows_wait <= (others => '0');
         map_wait  <= (others => '0');
         events(24) <= '0';
         events(25) <= '0';
       end if;
+      if rst = '1' or ms_clock = G_CLK_KHZ - 1 then
+        ms_clock <= (others => '0');
+      end if;
     end if;
   end process p_time;
 
-  expired     <= to_bit(quiet_ms = 0);
+  expired     <= to_bit(quiet_ms = G_SESSION_MS);
   full_duplex <= duplex_mode(1) or (pin_full_duplex and not duplex_mode(0));
   session     <= open_q;
 
