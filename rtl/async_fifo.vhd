@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- async_fifo: 2**G_DEPTH_LOG2 words between two clocks of any ratio.
 --   Rate     : one word per clock of the slower side, from a depth of 8 on
---   Latency  : a word shows on r_data two to three r_clk after the w_clk edge that took it; a place that was read is
---              free again two to three w_clk after the r_clk edge that took the word
+--   Latency  : a word shows with the second r_clk edge after the w_clk edge that took it (with the third if the first
+--              came too close); a place is free again with the second or third w_clk edge after its word was taken
 --   Contract : r_valid never waits for r_ready; a word shown holds until it is taken (or a reset). First word falls
 --              through: r_data is valid while r_valid = '1', straight from the array (constraints/crossings.md).
 --   Pointers : gray counters of one bit more than the address, no binary copy: the array is addressed in gray order,
@@ -10,8 +10,8 @@
 --   Reset    : w_rst and r_rst are synchronous to their clocks, at least one clock long (the first one after power-on
 --              at least 3 clocks, on both sides). Either empties the FIFO and stops both sides (w_ready = r_valid =
 --              '0') until both have seen it; as a pointer jumps only while the other side stands still, resets of one
---              side or of both in any order can neither invent words nor keep any. It takes up to 5 clocks of either
---              side, and both clocks must run for it to end.
+--              side or of both in any order can neither invent words nor keep any. Over at most 8 w_clk plus 8 r_clk
+--              after the last of them has ended; both clocks must run for that.
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
