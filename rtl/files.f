@@ -18,4 +18,8 @@ ram_dc.vhd
 async_fifo.vhd
 packet_rx.vhd
 packet_tx.vhd
+row_buffer.vhd
+map_buffer.vhd
+counters.vhd
+scheduler.vhd
 responder.vhd

@@ -1,0 +1,309 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- map_buffer: the map of one tile, written as the engine unloads it, read in chunks as bytes (docs/protocol.md, 'Data').
+--   Whole    : G_DEPTH >= G_CELLS: cell n at word n, always room. keep means nothing
+--   Ring     : G_DEPTH < G_CELLS, a multiple of G_CHUNK_CELLS: cell n at word n mod G_DEPTH. A chunk is begun when all
+--              chunks that lie G_DEPTH cells or more before it are below keep. keep belongs to the map inside: 0 in the
+--              clock after started, larger when the host asks; a keep that falls is ignored until the next map
+--   Write    : a cell per clock; empty: ready. complete after s_tlast, then not ready until release_map or clear
+--   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on: chunk f_chunk may be
+--              started. A jump takes a clock more for each chunk that the start address walks over: from the chunk
+--              after the one sent last if that is not above f_chunk, else from chunk 0. f_chunk may change after f_start
+--   Bytes    : ceil(G_CELL_W/8) per cell, big endian, zeros above the cell, and one idle clock after each cell. f_valid
+--              and f_data hold until f_take
+--   RAM      : a part of 9*k bits and one of the rest, because block RAMs are 9, 18, 36 bits wide when shallow and only
+--              4, 2, 1 when deep: 31 bits as 27 + 4 need 28 blocks for 32760 cells where one RAM of 31 bits needs 31
+--   Forget   : release_map or clear, in any clock, also while cells come or bytes go; clear comes first on f_valid, too
+--   Golden   : sw/golden/map_buffer.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity map_buffer is
+  generic (
+    G_CELL_W      : integer := 31;
+    G_CHUNK_CELLS : integer := 352;
+    G_CELLS       : integer := 32760;
+    G_DEPTH       : integer := 32760
+  );
+  port (
+    clk : in  std_logic;
+    rst : in  std_logic;
+
+    s_tvalid : in  std_logic;
+    s_tready : out std_logic;
+    s_tdata  : in  std_logic_vector(G_CELL_W - 1 downto 0);
+    s_tlast  : in  std_logic;
+
+    release_map : in  std_logic;
+    clear       : in  std_logic;
+    keep        : in  std_logic_vector(15 downto 0);
+    started     : out std_logic; -- in the clock in which the first cell is taken
+    busy        : out std_logic;
+    complete    : out std_logic;
+    count       : out std_logic_vector(23 downto 0);
+
+    f_chunk : in  std_logic_vector(15 downto 0);
+    f_ready : out std_logic;
+    f_start : in  std_logic;
+    f_valid : out std_logic;
+    f_take  : in  std_logic;
+    f_data  : out std_logic_vector(7 downto 0);
+    f_last  : out std_logic
+  );
+end entity map_buffer;
+
+architecture rtl of map_buffer is
+
+  function smaller (a, b : integer) return integer is
+  begin
+    if a < b then
+      return a;
+    end if;
+    return b;
+  end function smaller;
+
+  constant C_WHOLE      : boolean := G_DEPTH >= G_CELLS;
+  constant C_DEPTH      : integer := smaller(G_DEPTH, G_CELLS);
+  constant C_ADDR_W     : integer := clog2(C_DEPTH);
+  constant C_RING       : integer := G_DEPTH / G_CHUNK_CELLS; -- chunks
+  constant C_TURN       : integer := imax(0, C_DEPTH - G_CHUNK_CELLS); -- where the ring's last chunk starts
+  constant C_INDEX_W    : integer := clog2(G_CHUNK_CELLS);
+  constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
+  constant C_NINES      : integer := G_CELL_W / 9 * 9;
+
+  -- Write.
+  signal forget     : std_logic;
+  signal fire       : std_logic;
+  signal room       : std_logic;
+  signal busy_q     : std_logic;
+  signal complete_q : std_logic;
+  signal count_q    : unsigned(23 downto 0);
+  signal w_addr     : std_logic_vector(C_ADDR_W - 1 downto 0);
+  signal w_index    : unsigned(C_INDEX_W - 1 downto 0); -- in the chunk; stays at the last cell of a complete map
+  signal finished   : unsigned(15 downto 0);            -- chunks, the short last one included
+  signal kept       : unsigned(15 downto 0);            -- the largest keep of this map
+
+  -- Read. number and r_addr go together: the chunk and where it starts, but while sending: then r_addr is the cell and
+  -- number the next chunk.
+  signal exists     : std_logic;
+  signal ready_q    : std_logic;
+  signal number     : unsigned(15 downto 0);
+  signal r_addr     : unsigned(C_ADDR_W - 1 downto 0);
+  signal number_ok  : std_logic;
+  signal number_far : std_logic;                        -- beyond f_chunk
+  signal r_index    : unsigned(C_INDEX_W - 1 downto 0);
+  signal sending    : std_logic;
+  signal last_chunk : std_logic;
+  signal last_cell  : std_logic;
+  signal cell_valid : std_logic;                        -- cell_word is that of r_addr
+  signal cell_word  : std_logic_vector(G_CELL_W - 1 downto 0);
+  signal padded     : std_logic_vector(8 * C_CELL_BYTES - 1 downto 0);
+  signal byte_n     : unsigned(2 downto 0);
+  signal last_byte  : std_logic;
+  signal load       : std_logic;
+  signal picked     : std_logic_vector(7 downto 0);
+  signal valid_q    : std_logic;
+
+begin
+
+  assert G_CELL_W >= 9 and G_CELL_W <= 48
+    report "map_buffer: G_CELL_W=" & integer'image(G_CELL_W) & " outside 9..48"
+    severity failure;
+  assert G_CHUNK_CELLS >= 2 and G_CHUNK_CELLS <= 2048
+    report "map_buffer: G_CHUNK_CELLS=" & integer'image(G_CHUNK_CELLS) & " outside 2..2048"
+    severity failure;
+  -- Numbers of chunks have 16 bits.
+  assert G_CELLS >= 1 and G_CELLS < 2 ** 24 and G_CELLS / G_CHUNK_CELLS < 65535
+    report "map_buffer: G_CELLS=" & integer'image(G_CELLS) & " outside 1..16777215 or over 65535 chunks"
+    severity failure;
+  assert G_DEPTH >= G_CELLS or (G_DEPTH >= 2 * G_CHUNK_CELLS and G_DEPTH mod G_CHUNK_CELLS = 0)
+    report "map_buffer: G_DEPTH=" & integer'image(G_DEPTH) & " is neither G_CELLS nor two or more chunks"
+    severity failure;
+
+  -- Write ------------------------------------------------------------------------------------------------------------
+  forget   <= release_map or clear;
+  s_tready <= room and not complete_q;
+  fire     <= s_tvalid and room and not complete_q;
+  started  <= fire and not busy_q;
+  busy     <= busy_q;
+  complete <= complete_q;
+  count    <= std_logic_vector(count_q);
+
+  p_write : process (clk)
+  begin
+    if rising_edge(clk) then
+      if fire = '1' then
+        busy_q  <= '1';
+        count_q <= count_q + 1;
+        if s_tlast = '1' then
+          complete_q <= '1';
+        elsif w_index = G_CHUNK_CELLS - 1 then
+          w_index <= (others => '0');
+        else
+          w_index <= w_index + 1;
+        end if;
+        if s_tlast = '1' or w_index = G_CHUNK_CELLS - 1 then
+          finished <= finished + 1;
+        end if;
+      end if;
+      if rst = '1' or forget = '1' then
+        busy_q     <= '0';
+        complete_q <= '0';
+        count_q    <= (others => '0');
+        w_index    <= (others => '0');
+        finished   <= (others => '0');
+      end if;
+    end if;
+  end process p_write;
+
+  g_whole : if C_WHOLE generate
+    room   <= '1';
+    kept   <= (others => '0');
+    w_addr <= std_logic_vector(count_q(C_ADDR_W - 1 downto 0));
+    exists <= to_bit(unsigned(f_chunk) < finished);
+  end generate g_whole;
+
+  g_ring : if not C_WHOLE generate
+    signal addr : unsigned(C_ADDR_W - 1 downto 0);
+    signal used : unsigned(16 downto 0); -- finished chunks that are kept; negative if keep is ahead
+  begin
+    used   <= ('0' & finished) - ('0' & kept);
+    room   <= used(16) or to_bit(used(15 downto 0) < C_RING);
+    w_addr <= std_logic_vector(addr);
+    exists <= to_bit(unsigned(f_chunk) < finished) and to_bit(unsigned(f_chunk) >= kept);
+
+    p_ring : process (clk)
+    begin
+      if rising_edge(clk) then
+        if fire = '1' then
+          addr <= addr + 1;
+          if addr = C_DEPTH - 1 then
+            addr <= (others => '0');
+          end if;
+        end if;
+        if unsigned(keep) > kept and busy_q = '1' then
+          kept <= unsigned(keep);
+        end if;
+        if rst = '1' or forget = '1' then
+          addr <= (others => '0');
+          kept <= (others => '0');
+        end if;
+      end if;
+    end process p_ring;
+
+  end generate g_ring;
+
+  g_nines : if C_NINES > 0 generate
+
+    u_nines : entity work.ram_sdp
+      generic map (G_DATA_W => C_NINES, G_DEPTH => C_DEPTH, G_LATENCY => 1)
+      port map (
+        clk   => clk,
+        we    => fire,
+        waddr => w_addr,
+        wdata => s_tdata(C_NINES - 1 downto 0),
+        raddr => std_logic_vector(r_addr),
+        rdata => cell_word(C_NINES - 1 downto 0)
+      );
+
+  end generate g_nines;
+
+  g_rest : if C_NINES < G_CELL_W generate
+
+    u_rest : entity work.ram_sdp
+      generic map (G_DATA_W => G_CELL_W - C_NINES, G_DEPTH => C_DEPTH, G_LATENCY => 1)
+      port map (
+        clk   => clk,
+        we    => fire,
+        waddr => w_addr,
+        wdata => s_tdata(G_CELL_W - 1 downto C_NINES),
+        raddr => std_logic_vector(r_addr),
+        rdata => cell_word(G_CELL_W - 1 downto C_NINES)
+      );
+
+  end generate g_rest;
+
+  -- Read -------------------------------------------------------------------------------------------------------------
+  number_ok  <= to_bit(unsigned(f_chunk) = number);
+  number_far <= to_bit(unsigned(f_chunk) < number);
+  last_chunk <= complete_q and to_bit(number = finished);
+  last_cell  <= to_bit(r_index = G_CHUNK_CELLS - 1) or (last_chunk and to_bit(r_index = w_index));
+  last_byte  <= to_bit(byte_n = C_CELL_BYTES - 1);
+  load       <= cell_valid and (f_take or not valid_q);
+  padded     <= std_logic_vector(resize(unsigned(cell_word), 8 * C_CELL_BYTES));
+  f_ready    <= ready_q;
+  f_valid    <= valid_q;
+
+  p_pick : process (padded, byte_n)
+  begin
+    picked <= padded(7 downto 0);
+    for i in 0 to C_CELL_BYTES - 2 loop
+      if byte_n = i then
+        picked <= padded(8 * (C_CELL_BYTES - i) - 1 downto 8 * (C_CELL_BYTES - i - 1));
+      end if;
+    end loop;
+  end process p_pick;
+
+  p_read : process (clk)
+  begin
+    if rising_edge(clk) then
+      ready_q    <= exists and number_ok and not sending and not f_start;
+      cell_valid <= sending;
+
+      if load = '1' and last_byte = '1' then
+        cell_valid <= '0';
+        r_index    <= r_index + 1;
+        r_addr     <= r_addr + 1;
+        if r_addr = C_DEPTH - 1 then
+          r_addr <= (others => '0');
+        end if;
+        if last_cell = '1' then
+          sending <= '0';
+        end if;
+      end if;
+
+      if f_start = '1' then
+        sending    <= '1';
+        cell_valid <= '1';
+        r_index    <= (others => '0');
+        number     <= number + 1;
+      elsif sending = '0' then
+        if number_far = '1' then
+          number <= (others => '0');
+          r_addr <= (others => '0');
+        elsif number_ok = '0' and exists = '1' then
+          number <= number + 1;
+          if not C_WHOLE and r_addr = C_TURN then
+            r_addr <= (others => '0');
+          else
+            r_addr <= r_addr + G_CHUNK_CELLS;
+          end if;
+        end if;
+      end if;
+
+      if load = '1' then
+        valid_q <= '1';
+        f_data  <= picked;
+        f_last  <= last_byte and last_cell;
+        byte_n  <= byte_n + 1;
+        if last_byte = '1' then
+          byte_n <= (others => '0');
+        end if;
+      elsif f_take = '1' then
+        valid_q <= '0';
+      end if;
+
+      if rst = '1' or forget = '1' then
+        ready_q    <= '0';
+        sending    <= '0';
+        cell_valid <= '0';
+        number     <= (others => '0');
+        r_addr     <= (others => '0');
+        byte_n     <= (others => '0');
+        valid_q    <= '0';
+      end if;
+    end if;
+  end process p_read;
+
+end architecture rtl;
