@@ -16,6 +16,9 @@ cdc_sync.vhd
 reset_sync.vhd
 ram_dc.vhd
 async_fifo.vhd
+eth_pkg.vhd
+mac_rx.vhd
+mac_tx.vhd
 packet_rx.vhd
 packet_tx.vhd
 row_buffer.vhd
@@ -23,3 +26,5 @@ map_buffer.vhd
 counters.vhd
 scheduler.vhd
 responder.vhd
+arbiter.vhd
+psweep_top.vhd
