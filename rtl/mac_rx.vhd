@@ -1,0 +1,154 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- mac_rx: nibbles of MII to bytes and a verdict (IEEE 802.3: MAC clause 4.2.9, MII clause 22.2).
+--   In       : mii_rxd, mii_rx_dv, mii_rx_er, in step with clk = the PHY's receive clock, 2.5 or 25 MHz
+--   Out      : stream to async_fifo. The bytes behind the SFD with the FCS, at most 1518, then one beat with m_last and
+--              the verdict, 0 = good: bit 0 FCS wrong (of the whole bytes), 1 odd nibble and FCS wrong, 2 less than 64
+--              bytes, 3 more than 1518, 4 rx_er while rx_dv, from the preamble on, 5 a byte was lost because m_ready
+--              was 0. An odd nibble behind a right FCS is dropped without mention (4.2.4.2.1: dribble bits).
+--   SFD      : the first nibble D behind a 5, whatever comes before (4.2.9, PhysicalSignalDecap); without, nothing
+--              comes out
+--   Rate     : a byte every 2 clocks, the verdict within 1 clock of the last byte; frames may follow one clock after
+--              the other
+--   Latency  : 2 clocks from the second nibble of a byte to its beat, from rx_dv = '0' to the verdict
+--   Contract : a beat shown holds until it is taken. It need not be taken at once, but 2 clocks later the next byte
+--              comes and is lost if there is no room. The verdict is never lost: it waits; a frame whose rx_dv rises
+--              while it waits is not received.
+--   Reset    : nothing shown; what is left of a frame in progress is not received
+--   Golden   : sw/golden/mac_rx.hpp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+  use work.eth_pkg.all;
+
+entity mac_rx is
+  port (
+    clk       : in  std_logic;
+    rst       : in  std_logic;
+    mii_rxd   : in  std_logic_vector(3 downto 0);
+    mii_rx_dv : in  std_logic;
+    mii_rx_er : in  std_logic;
+    m_valid   : out std_logic;
+    m_ready   : in  std_logic;
+    m_last    : out std_logic;
+    m_data    : out std_logic_vector(7 downto 0)
+  );
+end entity mac_rx;
+
+architecture rtl of mac_rx is
+
+  constant C_MAX : unsigned(10 downto 0) := to_unsigned(1518, 11);
+
+  -- Pins, registered at the edge of the device.
+  signal nibble : std_logic_vector(3 downto 0);
+  signal dv     : std_logic;
+  signal er     : std_logic;
+
+  signal hunting  : std_logic; -- rx_dv was 0, and no SFD since
+  signal after_5  : std_logic;
+  signal in_frame : std_logic; -- from the SFD until the verdict is on its way
+  signal ended    : std_logic; -- rx_dv was 0 in the frame, the verdict waits
+  signal stop     : std_logic;
+  signal high     : std_logic; -- the low nibble of a byte is in `low`
+  signal low      : std_logic_vector(3 downto 0);
+  signal crc      : std_logic_vector(31 downto 0);
+  signal crc_good : std_logic;
+  signal was_good : std_logic; -- crc_good of the whole bytes, while high
+  signal wrong    : std_logic;
+  signal count    : unsigned(10 downto 0); -- bytes, up to C_MAX
+  signal full     : std_logic;
+  signal long     : std_logic;
+  signal error    : std_logic;
+  signal lost     : std_logic;
+  signal verdict  : std_logic_vector(5 downto 0);
+
+  signal byte_end : std_logic;
+  signal room     : std_logic;
+  signal valid    : std_logic;
+
+begin
+
+  m_valid  <= valid;
+  room     <= not valid or m_ready;
+  stop     <= in_frame and (ended or not dv);
+  byte_end <= in_frame and not stop and high;
+  full     <= to_bit(count = C_MAX);
+  crc_good <= to_bit(crc = C_CRC_RESIDUE);
+
+  -- The register has seen an odd nibble too, so what it said before that one was kept.
+  wrong   <= not crc_good when high = '0' else not was_good;
+  verdict <= lost & error & long & to_bit(count(10 downto 6) = 0) & (high and wrong) & wrong;
+
+  p_frame : process (clk)
+  begin
+    if rising_edge(clk) then
+      nibble <= mii_rxd;
+      dv     <= mii_rx_dv;
+      er     <= mii_rx_er;
+
+      if m_ready = '1' then
+        valid <= '0';
+      end if;
+
+      after_5 <= dv and to_bit(nibble = "0101");
+      if hunting = '1' and after_5 = '1' and dv = '1' and nibble = "1101" then
+        hunting  <= '0';
+        in_frame <= '1';
+      end if;
+      if dv = '1' and er = '1' and ended = '0' then
+        error <= '1';
+      end if;
+      if dv = '0' and (in_frame = '0' or room = '1') then
+        hunting <= '1';
+        error   <= '0';
+      end if;
+
+      -- In front of a frame: start values.
+      if in_frame = '0' then
+        high  <= '0';
+        crc   <= (others => '1');
+        count <= (others => '0');
+        long  <= '0';
+        lost  <= '0';
+        ended <= '0';
+      elsif stop = '0' then
+        high <= not high;
+        low  <= nibble;
+        crc  <= crc32_nibble(crc, nibble);
+        if high = '0' then
+          was_good <= crc_good;
+        end if;
+        if byte_end = '1' and full = '0' then
+          count <= count + 1;
+        end if;
+        if byte_end = '1' and full = '1' then
+          long <= '1';
+        end if;
+        if byte_end = '1' and full = '0' and room = '0' then
+          lost <= '1';
+        end if;
+      else
+        ended    <= not room;
+        in_frame <= not room;
+      end if;
+
+      -- Beats.
+      if room = '1' then
+        m_last <= stop;
+        if stop = '1' then
+          m_data <= "00" & verdict;
+        else
+          m_data <= nibble & low;
+        end if;
+        valid <= stop or (byte_end and not full);
+      end if;
+
+      if rst = '1' then
+        valid    <= '0';
+        hunting  <= '0';
+        in_frame <= '0';
+      end if;
+    end if;
+  end process p_frame;
+
+end architecture rtl;
