@@ -1,0 +1,584 @@
+// SPDX-License-Identifier: Apache-2.0
+// packet_rx: pulses of the counters, messages and stored frames equal the model clock by clock and byte by byte. All
+// lengths of UDP and ICMP, every bit of every header flipped, all faults alone and in pairs, checksums at their
+// corners, full slots, random and mutated frames, garbage of any length; what waits in a slot stays as it is. Frames
+// come from net/frames.hpp, and the outcome of the fault pairs is written down here: neither is the model's opinion.
+#include <algorithm>
+#include <deque>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "Vpacket_rx_2.h"
+#include "Vpacket_rx_4.h"
+#include "golden/packet_rx.hpp"
+#include "support/catch.hpp"
+#include "support/scoreboard.hpp"
+#include "support/sim.hpp"
+
+using namespace psweep;
+using namespace psweep::tb;
+using net::Bytes;
+
+namespace {
+
+// Number of slots and G_UDP_PORT of the models.
+template <class Dut>
+struct Traits;
+template <>
+struct Traits<Vpacket_rx_2> {
+  static constexpr size_t kSlots = 2;
+  static constexpr uint16_t kPort = 20563;
+};
+template <>
+struct Traits<Vpacket_rx_4> {
+  static constexpr size_t kSlots = 4;
+  static constexpr uint16_t kPort = 0x01fe;
+};
+
+constexpr uint64_t kEventLatency = 2;    // verdict to pulse
+constexpr uint64_t kMessageLatency = 3;  // verdict to m_valid
+
+template <class Dut>
+struct Bench : Agent {
+  struct Frame {
+    Bytes bytes;
+    uint8_t verdict;
+    int number;
+    uint16_t want;  // events; 0: what the model says
+  };
+  struct Waiting {
+    golden::Message message;
+    Bytes bytes;
+    uint64_t clock;  // from which on it is shown, if it is the oldest
+    int number;
+  };
+
+  Sim<Dut> sim{400000000, test_seed()};
+  Dut& dut = sim.dut();
+  std::mt19937 random{test_seed() + 17};
+  Scoreboard events{"events"}, shown{"m_valid"}, kinds{"m_kind"}, lengths{"m_length"}, bytes{"r_data"},
+      outcomes{"outcome"};
+  net::Address own;
+  std::array<uint64_t, 16> count{};
+
+  // What goes in.
+  std::deque<Frame> queue;
+  size_t next = 0;  // byte of queue.front()
+  double gaps = 0;
+  int sent = 0;
+  bool offering = false, room = false;
+
+  // What must come out.
+  std::deque<std::pair<uint64_t, uint16_t>> pulses;
+  std::deque<Waiting> waiting;
+  size_t used = 0;
+  uint64_t blocked_until = 0;  // m_valid is low in the clock behind m_done
+
+  // Reader: each message is read `passes` times, then held.
+  int passes = 1, max_hold = 0, pass = 0, hold = 0;
+  size_t reading = 0;
+  int asked = -1, asked_before = -1;
+  bool active = false, stopped = false;
+
+  Bench() {
+    for (auto& b : own.mac) b = static_cast<uint8_t>(random());
+    own.mac[0] &= 0xfe;
+    own.ip = static_cast<uint32_t>(random());
+    own.port = Traits<Dut>::kPort;
+    dut.s_valid = dut.s_last = dut.m_done = 0;
+    dut.r_addr = 0;
+    uint64_t mac = 0;
+    for (const uint8_t b : own.mac) mac = mac << 8 | b;
+    dut.own_mac = mac;
+    dut.own_ip = own.ip;
+    sim.add(*this);
+    sim.reset();
+  }
+  uint32_t below(uint32_t n) { return static_cast<uint32_t>(random()) % n; }
+  bool chance(double p) { return std::bernoulli_distribution(p)(random); }
+  Bytes noise(size_t size) {
+    Bytes b(size);
+    for (auto& v : b) v = static_cast<uint8_t>(random());
+    return b;
+  }
+  net::Address somebody() {
+    net::Address a;
+    for (auto& b : a.mac) b = static_cast<uint8_t>(random());
+    a.ip = static_cast<uint32_t>(random());
+    a.port = static_cast<uint16_t>(random());
+    return a;
+  }
+  // `frame` with its FCS.
+  void send(const Bytes& frame, uint8_t verdict = 0, uint16_t want = 0) {
+    queue.push_back({frame, verdict, sent++, want});
+  }
+  Bytes closed(Bytes frame) {
+    net::append_fcs(frame);
+    return frame;
+  }
+  Bytes udp(size_t size) { return net::make_udp(somebody(), own, noise(size)); }
+  // `size` bytes behind identifier and sequence number.
+  Bytes icmp(size_t size) { return net::make_icmp_echo(somebody(), own, 8, noise(4 + size)); }
+  Bytes arp() { return net::make_arp_request(somebody(), own.ip); }
+
+  void drive() override {
+    if (!offering) offering = !queue.empty() && !(gaps > 0 && chance(gaps));
+    dut.s_valid = offering;
+    const bool last = offering && next == queue.front().bytes.size();
+    dut.s_last = offering ? last : static_cast<uint8_t>(random() & 1);
+    dut.s_data = static_cast<uint8_t>(!offering ? random() : last ? queue.front().verdict : queue.front().bytes[next]);
+    dut.m_done = 0;
+    asked_before = asked;
+    asked = -1;
+    if (!active) {
+      dut.r_addr = random() & 0x7ff;
+      return;
+    }
+    const size_t size = waiting.front().bytes.size();
+    if (pass < passes) {
+      dut.r_addr = static_cast<uint16_t>(reading);
+      asked = static_cast<int>(reading);
+      if (++reading == size) reading = 0, ++pass;
+    } else if (asked_before < 0 && !stopped && hold-- <= 0) {
+      dut.m_done = 1;
+    }
+  }
+
+  void sample() override {
+    const uint64_t now = sim.cycle();
+    // Pulses.
+    uint16_t pulse = 0;
+    if (!pulses.empty() && pulses.front().first == now) {
+      pulse = pulses.front().second;
+      pulses.pop_front();
+    }
+    if (pulse != 0 || dut.events != 0) events.compare(dut.events, pulse, {}, now);
+    for (size_t i = 0; i < 16; ++i) count[i] += dut.events >> i & 1;
+
+    // Messages.
+    const bool valid = !waiting.empty() && now >= waiting.front().clock && now >= blocked_until;
+    shown.compare(dut.m_valid, valid, {}, now);
+    if (valid) {
+      const Waiting& w = waiting.front();
+      kinds.compare(dut.m_kind, static_cast<uint64_t>(w.message.kind), {w.number}, now);
+      lengths.compare(dut.m_length, static_cast<uint64_t>(w.message.length), {w.number}, now);
+      if (asked_before >= 0)
+        bytes.compare(dut.r_data, w.bytes[static_cast<size_t>(asked_before)], {w.number, -1, asked_before, 0}, now);
+      if (!active) active = true, pass = 0, reading = 0, hold = static_cast<int>(below(max_hold + 1u));
+    }
+
+    // A slot is free from the clock behind m_done on.
+    const size_t used_now = used;
+    if (dut.m_done) {
+      waiting.pop_front();
+      active = false;
+      --used;
+      blocked_until = now + 2;
+    }
+    if (!dut.s_valid || !dut.s_ready) return;
+    Frame& f = queue.front();
+    offering = false;
+    if (next == 0) room = used_now < Traits<Dut>::kSlots;
+    if (next++ < f.bytes.size()) return;
+    const golden::Received r = golden::PacketRx(own, f.bytes).receive(f.verdict, room);
+    if (f.want != 0) outcomes.compare(r.events, f.want, {f.number}, now);
+    pulses.emplace_back(now + kEventLatency, r.events);
+    if (r.message) waiting.push_back({*r.message, f.bytes, now + kMessageLatency, f.number}), ++used;
+    queue.pop_front();
+    next = 0;
+  }
+
+  void finish() {
+    sim.run_until([&] { return queue.empty() && waiting.empty() && pulses.empty(); });
+    sim.run(5);
+  }
+  void check() {
+    for (const Scoreboard* board : {&events, &shown, &kinds, &lengths, &bytes}) {
+      INFO(board->report());
+      CHECK(board->ok());
+    }
+    INFO(outcomes.report());
+    CHECK(outcomes.errors() == 0);
+  }
+};
+
+constexpr uint16_t bit(int counter) { return static_cast<uint16_t>(1 << counter); }
+constexpr uint16_t kGoodArp = bit(net::kRxFrames) | bit(net::kArp);
+constexpr uint16_t kGoodIcmp = bit(net::kRxFrames) | bit(net::kIcmp);
+constexpr uint16_t kGoodUdp = bit(net::kRxFrames) | bit(net::kUdp);
+
+// Makes the sums right again; `type`: which of them.
+void repair_header(Bytes& f) {
+  net::put16(f, 24, 0);
+  net::put16(f, 24, net::internet_checksum(f.data() + 14, 20));
+}
+void repair_content(Bytes& f) {
+  const size_t end = std::min<size_t>(f.size(), std::max<size_t>(14 + net::get16(f, 16), 42));
+  const bool udp = f[23] == net::kProtocolUdp;
+  const size_t at = udp ? 40 : 36;
+  const uint32_t start =
+      udp ? net::pseudo_header_sum(net::get32(f, 26), net::get32(f, 30), f[23], net::get16(f, 38)) : 0;
+  net::put16(f, at, 0);
+  const uint16_t sum = net::internet_checksum(f.data() + 34, end - 34, start);
+  net::put16(f, at, udp && sum == 0 ? 0xffff : sum);
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("packet_rx: every length of UDP and ICMP, with and without checksum, unicast and broadcast", "",
+                   Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (size_t size = 0; size <= 1472; ++size) {
+    Bytes f = bench->udp(size);
+    if (size % 3 == 1) net::put16(f, 40, 0);
+    if (size % 5 == 2) std::fill_n(f.begin(), 6, 0xff);
+    bench->send(bench->closed(f), 0, kGoodUdp);
+    f = bench->icmp(size);
+    if (size % 5 == 3) std::fill_n(f.begin(), 6, 0xff);
+    bench->send(bench->closed(f), 0, kGoodIcmp);
+    bench->finish();  // one by one, so that there is room
+    if (size % 100 == 0) bench->send(bench->closed(bench->arp()), 0, kGoodArp);
+    bench->gaps = size % 7 == 0 ? 0.7 : 0;
+    bench->finish();
+  }
+  bench->check();
+  CHECK(bench->count[net::kUdp] == 1473);
+  CHECK(bench->count[net::kIcmp] == 1473);
+  CHECK(bench->count[net::kArp] == 15);
+  CHECK(bench->count[net::kRxFrames] == 2 * 1473 + 15);
+}
+
+TEMPLATE_TEST_CASE("packet_rx: padding behind the packet changes nothing, a packet beyond the frame is refused", "",
+                   Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (size_t size = 0; size <= 40; ++size) {
+    for (size_t padding = 0; padding <= 30; ++padding) {
+      for (const bool udp : {true, false}) {
+        Bytes f = udp ? bench->udp(size) : bench->icmp(size);
+        const Bytes tail = bench->noise(padding);
+        f.insert(f.end(), tail.begin(), tail.end());
+        f = bench->closed(f);
+        bench->send(f, 0, udp ? kGoodUdp : kGoodIcmp);
+        bench->finish();
+      }
+    }
+    // As much as there is, and one byte more, up to the FCS.
+    for (size_t more = 0; more <= 5; ++more) {
+      Bytes f = bench->icmp(60 + size);
+      net::put16(f, 16, static_cast<uint32_t>(f.size() - 14 + more));
+      repair_header(f);
+      repair_content(f);
+      bench->send(bench->closed(f), 0, more == 0 ? kGoodIcmp : bit(net::kIpHeader));
+      bench->finish();
+    }
+  }
+  bench->check();
+}
+
+TEMPLATE_TEST_CASE("packet_rx: every bit of the first 42 bytes matters as the model says", "", Vpacket_rx_2,
+                   Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (const Bytes& good : {bench->udp(23), bench->icmp(24), bench->arp()}) {
+    for (size_t at = 0; at < 42; ++at) {
+      for (int flip = 0; flip < 8; ++flip) {
+        for (const int repair : {0, 1, 2}) {
+          Bytes f = good;
+          f[at] = static_cast<uint8_t>(f[at] ^ 1 << flip);
+          if (repair >= 1 && f[13] == 0) repair_header(f);
+          if (repair >= 2 && f[13] == 0) repair_content(f);
+          bench->send(bench->closed(f));
+          bench->finish();
+        }
+      }
+    }
+  }
+  bench->check();
+  for (const int counter : {net::kRxFrames, net::kRxFiltered, net::kRxOther, net::kIpHeader, net::kIpFragment,
+                            net::kChecksum, net::kArp, net::kIcmp, net::kUdp}) {
+    INFO(net::kCounterNames[counter]);
+    CHECK(bench->count[static_cast<size_t>(counter)] > 0);
+  }
+}
+
+TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in order counts", "", Vpacket_rx_2,
+                   Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  struct Fault {
+    const char* name;
+    int counter;
+    std::function<void(Bytes&, uint8_t&)> make;
+    char kinds;  // of 'u', 'i', 'a'; '*' all, 'p' IP
+  };
+  enum { kHeaderSum = 1, kContentSum = 2 };
+  int broken = 0;  // sums that are wrong on purpose
+  auto verdict_bit = [](int n) { return [n](Bytes&, uint8_t& v) { v = static_cast<uint8_t>(v | 1 << n); }; };
+  auto set = [](size_t at, uint8_t value) { return [at, value](Bytes& f, uint8_t&) { f[at] = value; }; };
+  auto flip = [](size_t at, uint8_t mask) {
+    return [at, mask](Bytes& f, uint8_t&) { f[at] = static_cast<uint8_t>(f[at] ^ mask); };
+  };
+  // In the order of precedence.
+  const std::vector<Fault> faults = {
+      {"overflow", net::kRxOverflow, verdict_bit(5), '*'},
+      {"rx_er", net::kRxError, verdict_bit(4), '*'},
+      {"long", net::kRxLong, verdict_bit(3), '*'},
+      {"short", net::kRxShort, verdict_bit(2), '*'},
+      {"odd nibble", net::kRxAlign, verdict_bit(1), '*'},
+      {"FCS", net::kRxFcs, verdict_bit(0), '*'},
+      {"other MAC, first byte", net::kRxFiltered, set(0, 0x02), '*'},
+      {"other MAC, last byte", net::kRxFiltered, flip(5, 0x01), '*'},
+      {"ethertype IPv6", net::kRxOther, [](Bytes& f, uint8_t&) { net::put16(f, 12, 0x86dd); }, '*'},
+      {"ethertype 0x0802", net::kRxOther, set(13, 0x02), '*'},
+      {"ARP hardware", net::kRxOther, set(15, 6), 'a'},
+      {"ARP protocol", net::kRxOther, set(17, 6), 'a'},
+      {"ARP sizes", net::kRxOther, set(18, 8), 'a'},
+      {"ARP reply", net::kRxOther, set(21, 2), 'a'},
+      {"ARP target", net::kRxOther, flip(41, 0x80), 'a'},
+      {"version 6", net::kIpHeader, set(14, 0x65), 'p'},
+      {"options", net::kIpHeader, set(14, 0x46), 'p'},
+      {"total length 27", net::kIpHeader, [](Bytes& f, uint8_t&) { net::put16(f, 16, 27); }, 'p'},
+      {"total length 19", net::kIpHeader, [](Bytes& f, uint8_t&) { net::put16(f, 16, 19); }, 'p'},
+      {"total length + 2048", net::kIpHeader, flip(16, 0x08), 'p'},
+      {"total length beyond the frame", net::kIpHeader,
+       [](Bytes& f, uint8_t&) { net::put16(f, 16, static_cast<uint32_t>(f.size() - 17)); }, 'p'},
+      {"IP checksum", net::kIpHeader, [&broken](Bytes&, uint8_t&) { broken |= kHeaderSum; }, 'p'},
+      {"other IP", net::kIpHeader, flip(33, 0x40), 'p'},
+      {"more fragments", net::kIpFragment, flip(20, 0x20), 'p'},
+      {"offset, high", net::kIpFragment, flip(20, 0x10), 'p'},
+      {"offset, low", net::kIpFragment, flip(21, 0x01), 'p'},
+      {"protocol TCP", net::kRxOther, set(23, 6), 'p'},
+      {"protocol 0x13", net::kRxOther, set(23, 0x13), 'p'},
+      {"port, high", net::kRxOther, flip(36, 0x80), 'u'},
+      {"port, low", net::kRxOther, flip(37, 0x01), 'u'},
+      {"ICMP reply", net::kRxOther, set(34, 0), 'i'},
+      {"ICMP code", net::kRxOther, set(35, 1), 'i'},
+      {"UDP length + 1", net::kChecksum, flip(39, 0x01), 'u'},
+      {"UDP length + 256", net::kChecksum, flip(38, 0x01), 'u'},
+      {"UDP length + 2048", net::kChecksum, flip(38, 0x08), 'u'},
+      {"checksum", net::kChecksum, [&broken](Bytes&, uint8_t&) { broken |= kContentSum; }, 'p'},
+  };
+  auto applies = [](char want, char kind) { return want == '*' || want == kind || (want == 'p' && kind != 'a'); };
+  for (const char kind : {'u', 'i', 'a'}) {
+    for (size_t a = 0; a < faults.size(); ++a) {
+      for (size_t b = a; b < faults.size(); ++b) {
+        if (!applies(faults[a].kinds, kind) || !applies(faults[b].kinds, kind)) continue;
+        Bytes f = bench->closed(kind == 'u' ? bench->udp(64) : kind == 'i' ? bench->icmp(65) : bench->arp());
+        uint8_t verdict = 0;
+        broken = 0;
+        faults[b].make(f, verdict);
+        if (b != a) faults[a].make(f, verdict);  // where both touch a byte, the first in order stays
+        if (kind != 'a') {
+          if (kind == 'i' || (f[40] | f[41])) repair_content(f);
+          if (broken & kContentSum) f[40] = static_cast<uint8_t>(f[40] ^ 0x10);
+          repair_header(f);
+          if (broken & kHeaderSum) f[25] = static_cast<uint8_t>(f[25] ^ 0x01);
+        }
+        const int counter = faults[a].counter;
+        INFO(kind << ": " << faults[a].name << " and " << faults[b].name);
+        bench->send(f, verdict, bit(counter));
+        bench->finish();
+        REQUIRE(bench->outcomes.errors() == 0);
+        REQUIRE(bench->events.errors() == 0);
+      }
+    }
+  }
+  CHECK(bench->outcomes.compared() > 900);
+  // A good frame after all that.
+  bench->send(bench->closed(bench->udp(9)), 0, kGoodUdp);
+  bench->finish();
+  bench->check();
+}
+
+TEMPLATE_TEST_CASE("packet_rx: every verdict, and verdicts without a byte", "", Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (int verdict = 0; verdict < 64; ++verdict) {
+    bench->send(bench->closed(bench->udp(30)), static_cast<uint8_t>(verdict));
+    if (verdict != 0) bench->send({}, static_cast<uint8_t>(verdict));
+    bench->finish();
+  }
+  bench->check();
+  CHECK(bench->count[net::kUdp] == 1);
+  CHECK(bench->count[net::kRxOverflow] == 64);
+}
+
+TEMPLATE_TEST_CASE("packet_rx: checksums at their corners", "", Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  int all_ones = 0;
+  for (int i = 0; i < 400; ++i) {
+    // Payload whose last word makes the true checksum 0, or one beside it.
+    const net::Address from = bench->somebody();
+    const size_t size = 2 + bench->below(60);
+    Bytes payload = bench->noise(size);
+    const size_t at = (size - 2) / 2 * 2;
+    payload[at] = payload[at + 1] = 0;
+    Bytes f = net::make_udp(from, bench->own, payload);
+    const uint32_t rest = net::get16(f, 40);
+    const uint32_t want = bench->below(3);  // the true checksum: 0xffff, 0 or 1 beyond
+    const uint32_t word = rest + (want == 0 ? 0 : want == 1 ? 0xfffe : 1);
+    net::put16(payload, at, word > 0xffff ? word - 0xffff : word);
+    f = net::make_udp(from, bench->own, payload);
+    if (net::get16(f, 40) == 0xffff) ++all_ones;
+    bench->send(bench->closed(f), 0, kGoodUdp);
+    Bytes wrong = f;
+    wrong[40] = static_cast<uint8_t>(wrong[40] ^ 1 << bench->below(8));
+    bench->send(bench->closed(wrong), 0, bit(net::kChecksum));
+    net::put16(f, 40, 0);  // none: anything passes
+    f[42] = static_cast<uint8_t>(~f[42]);
+    bench->send(bench->closed(f), 0, kGoodUdp);
+    bench->finish();
+  }
+  CHECK(all_ones > 50);
+  // Only one byte of the checksum is zero: it counts.
+  for (const size_t zero : {40, 41}) {
+    Bytes f = bench->udp(32);
+    f[zero] = 0;
+    f[81 - zero] = 0x5a;
+    bench->send(bench->closed(f));
+  }
+  bench->finish();
+  // All ones, the carry that waits at the end, and ICMP's checksum in both its zeros.
+  for (size_t size = 1; size < 40; ++size) {
+    for (const uint8_t fill : Bytes{0xff, 0x00, 0xfe, 0x01}) {
+      Bytes f = net::make_icmp_echo(bench->somebody(), bench->own, 8, Bytes(3 + size, fill));
+      bench->send(bench->closed(f), 0, kGoodIcmp);
+      f[36] = static_cast<uint8_t>(f[36] ^ 0x01);
+      bench->send(bench->closed(f), 0, bit(net::kChecksum));
+      bench->finish();
+    }
+  }
+  for (const uint32_t sum : {0u, 0xffffu}) {
+    Bytes f = net::make_icmp_echo(bench->somebody(), bench->own, 8, {0xf7, 0xff, 0, 0});
+    CHECK(net::get16(f, 36) == 0);
+    net::put16(f, 36, sum);
+    bench->send(bench->closed(f), 0, kGoodIcmp);
+    bench->finish();
+  }
+  bench->check();
+}
+
+TEMPLATE_TEST_CASE("packet_rx: full slots, freed at any time, with a byte in every clock", "", Vpacket_rx_2,
+                   Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  bench->passes = 2;
+  for (int i = 0; i < 3000; ++i) {
+    const uint32_t kind = bench->below(4);
+    Bytes f = kind == 0 ? bench->arp() : kind == 1 ? bench->icmp(bench->below(80)) : bench->udp(bench->below(80));
+    const bool good = bench->below(8) != 0;
+    bench->send(bench->closed(f), good ? 0 : static_cast<uint8_t>(bench->below(64)));
+    if (bench->below(16) == 0) bench->send({}, 0x20);
+  }
+  while (!bench->queue.empty()) {
+    bench->max_hold = static_cast<int>(bench->below(4)) * 150;
+    bench->gaps = bench->below(3) == 0 ? 0.5 : 0;
+    bench->sim.run(500);
+  }
+  bench->finish();
+  bench->check();
+  CHECK(bench->count[net::kRxNoSlot] > 300);
+  CHECK(bench->count[net::kRxFrames] > 300);
+}
+
+TEMPLATE_TEST_CASE("packet_rx: garbage of any length never touches a waiting message", "", Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  constexpr size_t kSlots = Traits<TestType>::kSlots;
+  for (size_t filled = 1; filled <= kSlots; ++filled) {
+    bench->stopped = true;
+    for (size_t i = 0; i < filled; ++i) bench->send(bench->closed(bench->udp(1472 - i)), 0, kGoodUdp);
+    for (const size_t size : {0, 1, 5, 13, 33, 34, 41, 63, 1518, 1519, 1570, 2014, 2047, 2048, 2049, 4100, 9000}) {
+      Bytes f = bench->noise(size);
+      std::copy_n(bench->own.mac.begin(), std::min<size_t>(6, size), f.begin());
+      bench->send(f, static_cast<uint8_t>(size < 64 ? 4 : size > 1518 ? 8 : 1));
+    }
+    bench->sim.run_until([&] { return bench->queue.empty(); });
+    bench->pass = 0;  // read again
+    bench->passes = 2;
+    bench->stopped = false;
+    bench->finish();
+    bench->passes = 1;
+  }
+  bench->check();
+  CHECK(bench->count[net::kRxNoSlot] == 0);
+}
+
+TEMPLATE_TEST_CASE("packet_rx: random and mutated frames", "", Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  const uint32_t seed = test_seed();
+  INFO("seed " << seed);
+  auto random_size = [&] { return bench->below(6) == 0 ? bench->below(1473) : bench->below(90); };
+  for (int i = 0; i < 12000; ++i) {
+    const uint32_t kind = bench->below(8);
+    Bytes f = kind == 0   ? bench->arp()
+              : kind == 1 ? bench->noise(14 + random_size())
+              : kind < 4  ? bench->icmp(random_size())
+                          : bench->udp(random_size());
+    if (kind == 1) {
+      std::copy_n(bench->own.mac.begin(), 6, f.begin());
+      if (bench->chance(0.7)) net::put16(f, 12, bench->chance(0.8) ? 0x0800 : 0x0806);
+    }
+    for (uint32_t n = bench->below(4); n > 0; --n) {
+      const uint32_t where = bench->below(4);
+      const size_t at = where == 0 ? bench->below(static_cast<uint32_t>(f.size())) : bench->below(42);
+      if (at >= f.size()) continue;
+      const uint32_t how = bench->below(5);
+      f[at] = how == 0   ? 0
+              : how == 1 ? 0xff
+              : how == 2 ? static_cast<uint8_t>(bench->random())
+                         : static_cast<uint8_t>(f[at] ^ 1 << bench->below(8));
+    }
+    if (f.size() >= 42 && bench->chance(0.3)) {  // hostile lengths
+      const uint32_t real = static_cast<uint32_t>(f.size() - 14);
+      const uint32_t choice[] = {0,     19, 20, 27, 28, real, real + 1, real + 4, real + 5, real - 1, 0x0800 + real,
+                                 0xffff};
+      net::put16(f, 16, choice[bench->below(12)]);
+      if (bench->chance(0.5)) net::put16(f, 38, net::get16(f, 16) - 20);
+    }
+    if (f.size() >= 42 && f[13] == 0 && bench->chance(0.7)) {
+      if (bench->chance(0.8)) repair_content(f);
+      repair_header(f);
+    }
+    if (bench->chance(0.1)) f.resize(bench->below(static_cast<uint32_t>(f.size()) + 1));  // truncated
+    if (bench->chance(0.1)) {                                                             // overlong
+      const Bytes tail = bench->noise(bench->below(200));
+      f.insert(f.end(), tail.begin(), tail.end());
+    }
+    if (bench->chance(0.95)) net::append_fcs(f);
+    uint8_t verdict = bench->chance(0.9) ? 0 : static_cast<uint8_t>(bench->below(64));
+    if (f.size() > 1518) verdict = static_cast<uint8_t>(verdict | 8);
+    if (f.size() < 64 && bench->chance(0.7)) verdict = static_cast<uint8_t>(verdict | 4);
+    bench->send(f, verdict);
+  }
+  while (!bench->queue.empty()) {
+    bench->max_hold = bench->below(3) == 0 ? 3000 : 0;
+    bench->gaps = bench->below(4) * 0.25;
+    bench->sim.run(3000);
+  }
+  bench->finish();
+  bench->check();
+  for (int counter = 0; counter < 16; ++counter) {
+    INFO(net::kCounterNames[counter]);
+    CHECK(bench->count[static_cast<size_t>(counter)] > 10);
+  }
+}
+
+TEMPLATE_TEST_CASE("packet_rx: reset in the middle of anything leaves nothing", "", Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (int i = 0; i < 60; ++i) {
+    bench->stopped = true;
+    for (int n = 0; n < 3; ++n) bench->send(bench->closed(bench->udp(bench->below(30))));
+    bench->sim.run(20 + bench->below(220));
+    bench->queue.clear();
+    bench->waiting.clear();
+    bench->pulses.clear();
+    bench->offering = bench->active = false;
+    bench->asked = bench->asked_before = -1;
+    bench->next = bench->used = 0;
+    bench->dut.s_valid = bench->dut.m_done = 0;
+    bench->sim.reset();
+    bench->stopped = false;
+    for (size_t n = 0; n < Traits<TestType>::kSlots; ++n)
+      bench->send(bench->closed(n % 2 ? bench->icmp(n) : bench->udp(n)), 0, n % 2 ? kGoodIcmp : kGoodUdp);
+    bench->finish();
+  }
+  bench->check();
+}
