@@ -11,7 +11,8 @@
 --              at least 3 clocks, on both sides). Either empties the FIFO and stops both sides (w_ready = r_valid =
 --              '0') until both have seen it; as a pointer jumps only while the other side stands still, resets of one
 --              side or of both in any order can neither invent words nor keep any. Over at most 8 w_clk plus 8 r_clk
---              after the last of them has ended; both clocks must run for that.
+--              after the last of them has ended; both clocks must run for that. A reset that comes when the last
+--              one of its side is not yet over counts as part of it.
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
@@ -87,6 +88,7 @@ architecture rtl of async_fifo is
   function gray_next (gray : t_pointer) return t_pointer is
     variable v_count : unsigned(C_TOP downto 0);
   begin
+    v_count        := (others => '0'); -- else the netlist begins with unknown bits, on which Verilator stops
     v_count(C_TOP) := gray(C_TOP);
     for i in C_TOP - 1 downto 0 loop
       v_count(i) := v_count(i + 1) xor gray(i);
@@ -175,10 +177,11 @@ begin
       if w_clear = '1' then
         w_gray <= (others => '0');
       end if;
-      -- The request ends after the pointer's jump, so that the reader cannot see them the other way round.
-      if w_rst = '1' then
+      -- The request ends after the pointer's jump, so that the reader cannot see them the other way round; and the
+      -- next one begins when the last answer is gone, else that would end it at once.
+      if w_rst = '1' and w_answer /= '1' then
         w_request <= '1';
-      elsif w_answer = '1' and w_zero = '1' then
+      elsif w_rst = '0' and w_answer = '1' and w_zero = '1' then
         w_request <= '0';
       end if;
     end if;
@@ -193,9 +196,9 @@ begin
       if r_clear = '1' then
         r_gray <= (others => '0');
       end if;
-      if r_rst = '1' then
+      if r_rst = '1' and r_answer /= '1' then
         r_request <= '1';
-      elsif r_answer = '1' and r_zero = '1' then
+      elsif r_rst = '0' and r_answer = '1' and r_zero = '1' then
         r_request <= '0';
       end if;
     end if;
