@@ -88,7 +88,6 @@ class Arbiter {
       }
     }
     now_ = std::max(now_, time);
-    engine_time_ = std::max(engine_time_, now_);
   }
 
   // The replies to one UDP payload: none or one.
