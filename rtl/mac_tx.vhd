@@ -2,10 +2,10 @@
 -- mac_tx: frames from two slots of a RAM to nibbles of MII, full or half duplex (IEEE 802.3: MAC clause 4.2.8, MII
 --         clause 22.2; CSMA/CD as in 4.2.3.2).
 --   Frame    : 15 nibbles 5 and one D, the bytes with the low nibble first, zeros up to 60 bytes, FCS
---   Frame    : 15 nibbles 5 and one D, the bytes with the low nibble first, zeros up to 60 bytes, FCS
---              crs (its two flip-flops of synchronisation and the output's two clocks come on top) or of tx_en. crs in
---              the first 16 starts the gap again, in the last 8 it does not; a frame that waits when the gap ends goes
---              out whatever crs says then (4.2.3.2.1).
+--   Gap      : full duplex: tx_en is low for exactly 24 nibbles if a frame waits. Half duplex: 24 clocks from the end
+--              of tx_en or crs (of crs: two clocks of synchronisation and two of output come on top). crs in the first
+--              16 starts the gap again, in the last 8 it does not; a frame that waits when the gap ends goes out
+--              whatever crs says then (4.2.3.2.1).
 --   Collision: col in nibble 0 .. 127 of a transmission (preamble included): preamble and SFD are completed, then come
 --              8 nibbles of jam (all 5), and the frame is sent again after 0 .. 2**min(n, 10) - 1 slots of 128 nibbles
 --              from the end of the jam and a gap, n = number of its collisions; given up at the 16th. From nibble 128
