@@ -48,6 +48,9 @@ class ChipModel {
 
   virtual bool session() const = 0;  // led_session
   virtual bool busy() const = 0;     // led_busy
+  // Since power-on: tiles launched (start commands on dbg_cfg), clocks with led_busy.
+  virtual int64_t launches() const = 0;
+  virtual int64_t busy_clocks() const = 0;
 
   // Waves from now on. Throws WaveError if the model was built without.
   virtual void open_wave(const std::string& file) = 0;

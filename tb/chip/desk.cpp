@@ -104,13 +104,7 @@ void Desk::rx_edge() {
     }
   }
   chip_->rx_edge(link_.rx_clock(), now_);
-  const bool busy = chip_->busy();
-  if (busy) busy_time_ += rx_period_;
-  if (busy && !was_busy_) {
-    if (wave_ && tiles_ == wave_->tile) open_wave();
-    ++tiles_;
-  }
-  was_busy_ = busy;
+  if (wave_ && wave_->tile >= 0 && chip_->launches() > wave_->tile) open_wave();
 }
 
 void Desk::tx_edge() {

@@ -81,8 +81,6 @@ class Desk {
   const LinkCounters& link() const { return link_.counters(); }
   const FaultCounters& faults_to_chip() const { return to_chip_.counters(); }
   const FaultCounters& faults_from_chip() const { return from_chip_.counters(); }
-  int64_t tiles() const { return tiles_; }       // begun by the engine
-  Time busy_time() const { return busy_time_; }  // led_busy, sampled at the receive clock
 
   // Frames that were whole at the chip's pins, in the order they began, stamped with that time.
   void record(const std::string& pcap_file) { pcap_ = std::make_unique<PcapWriter>(pcap_file); }
@@ -115,9 +113,8 @@ class Desk {
   Time clk_period_, rx_period_, tx_period_;
   Time next_clk_, next_rx_, next_tx_;
   Time active_ = 0;  // when something happened last
-  int64_t clocks_ = 0, tiles_ = 0;
-  Time busy_time_ = 0;
-  bool was_busy_ = false, plugged_ = true;
+  int64_t clocks_ = 0;
+  bool plugged_ = true;
   bool carrier_ = false, collision_ = false;
 
   std::unique_ptr<PcapWriter> pcap_;

@@ -75,6 +75,8 @@ class EchoChip : public ChipModel {
   }
   bool session() const override { return false; }
   bool busy() const override { return false; }
+  int64_t launches() const override { return 0; }
+  int64_t busy_clocks() const override { return 0; }
   void open_wave(const std::string& file) override { throw WaveError(file + ": the stand-in has no waves"); }
   void close_wave() override {}
 

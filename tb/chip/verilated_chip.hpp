@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// VerilatedChip<Dut>: ChipModel over the Verilated class of one configuration of psweep_top. Included by the generated
+// file of each configuration alone.
+//   A rising edge of clk costs two evaluations, one of an MII clock only one: it is lowered together with clk, of which
+//   there is at least one edge in between (clk >= 30 MHz). An input that changes together with its clock is taken
+//   with its new value, as if it had been there before.
+#pragma once
+#include <verilated.h>
+#if VM_TRACE
+#include <verilated_fst_c.h>
+#endif
+#include <memory>
+#include <string>
+
+#include "chip/chip_model.hpp"
+#include "golden/control.hpp"
+
+namespace psweep::chip {
+
+template <class Dut>
+class VerilatedChip : public ChipModel {
+ public:
+  VerilatedChip() {
+    // Random start contents, always the same: what depends on them differs from the model.
+    context_.randReset(2);
+    context_.randSeed(1);
+    context_.timeunit(-12);
+    context_.timeprecision(-12);
+#if VM_TRACE
+    context_.traceEverOn(true);
+#endif
+    dut_ = std::make_unique<Dut>(&context_);
+    dut_->clk = 0;
+    dut_->mii_rx_clk = 0;
+    dut_->mii_tx_clk = 0;
+    dut_->arst_n = 0;
+    dut_->mii_rxd = 0;
+    dut_->mii_rx_dv = 0;
+    dut_->mii_rx_er = 0;
+    dut_->mii_crs = 0;
+    dut_->mii_col = 0;
+    dut_->eval();
+  }
+  ~VerilatedChip() override {
+    close_wave();
+    dut_->final();
+  }
+
+  void set_pins(const StaticPins& pins) override {
+    dut_->phy_full_duplex = pins.full_duplex;
+    dut_->phy_speed_100 = pins.speed_100;
+    dut_->straps = pins.straps;
+  }
+  void set_reset(bool active) override { dut_->arst_n = !active; }
+  void set_medium(bool carrier, bool collision) override {
+    dut_->mii_crs = carrier;
+    dut_->mii_col = collision;
+  }
+
+  void clk_edges(int64_t count, Time first, Time period) override {
+    for (int64_t i = 0; i < count; ++i) {
+      const Time at = first + i * period;
+      dut_->clk = 0;
+      dut_->mii_rx_clk = 0;
+      dut_->mii_tx_clk = 0;
+      evaluate(at - period / 2);
+      // What the edge will take.
+      busy_clocks_ += dut_->led_busy;
+      if (dut_->dbg_cfg_tvalid && dut_->dbg_cfg_tdata >> 32 == golden::kRegCommand &&
+          (dut_->dbg_cfg_tdata & golden::kCommandStart) != 0)
+        ++launches_;
+      dut_->clk = 1;
+      evaluate(at);
+    }
+  }
+  void rx_edge(const MiiSample& pins, Time at) override {
+    dut_->mii_rxd = pins.data;
+    dut_->mii_rx_dv = pins.valid;
+    dut_->mii_rx_er = pins.error;
+    dut_->mii_rx_clk = 1;
+    evaluate(at);
+  }
+  MiiSample tx_edge(Time at) override {
+    const MiiSample shown{dut_->mii_txd, dut_->mii_tx_en != 0, false};
+    dut_->mii_tx_clk = 1;
+    evaluate(at);
+    return shown;
+  }
+
+  bool session() const override { return dut_->led_session != 0; }
+  bool busy() const override { return dut_->led_busy != 0; }
+  int64_t launches() const override { return launches_; }
+  int64_t busy_clocks() const override { return busy_clocks_; }
+
+  void open_wave([[maybe_unused]] const std::string& file) override {
+#if VM_TRACE
+    trace_ = std::make_unique<VerilatedFstC>();
+    dut_->trace(trace_.get(), 99);
+    trace_->open(file.c_str());
+    if (!trace_->isOpen()) throw WaveError(file + ": cannot be written");
+#else
+    throw WaveError("this configuration was built without waves (\"waves\" in its JSON file)");
+#endif
+  }
+  void close_wave() override {
+#if VM_TRACE
+    if (trace_) trace_->close();
+    trace_.reset();
+#endif
+  }
+
+ private:
+  void evaluate([[maybe_unused]] Time at) {
+    dut_->eval();
+#if VM_TRACE
+    if (trace_) trace_->dump(static_cast<uint64_t>(at / 1000));
+#endif
+  }
+  VerilatedContext context_;
+  std::unique_ptr<Dut> dut_;
+#if VM_TRACE
+  std::unique_ptr<VerilatedFstC> trace_;
+#endif
+  int64_t launches_ = 0, busy_clocks_ = 0;
+};
+
+}  // namespace psweep::chip
