@@ -40,7 +40,10 @@ class Pump {
     figures_.counters_before = client_.counters();
     begin_session(false);
     while (wanted_ < count_ || (releasing_ && !lost_session_)) {
-      if (lost_session_) begin_session(true);
+      if (lost_session_) {
+        begin_session(true);
+        continue;
+      }
       act();
       const double now = client_.now();
       const auto event = client_.receive(std::max(0.0, next_timer() - now));
@@ -52,7 +55,7 @@ class Pump {
         }
       }
       on_timer();
-      client_.check_silence(outstanding());
+      if (client_.silent_for() > client_.timeout()) client_.check_silence(outstanding());
     }
     client_.close();
     figures_.counters_after = client_.counters();
@@ -129,7 +132,7 @@ class Pump {
     start_after_ = 0;
     asked_ = answered_ = 0;
     progress_(cells_done_);
-    write_table(client_, c_, table_);
+    lost_session_ = !write_table(client_, c_, table_);
     session_order_ = client_.order();
     asked_at_ = client_.now();
   }
@@ -551,7 +554,7 @@ bool decode_cells(const ArbiterConfig& c, const golden::TileJob& job, const Byte
   return true;
 }
 
-void write_table(Client& client, const ArbiterConfig& c, const std::vector<golden::PlaneEntry>& table) {
+bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golden::PlaneEntry>& table) {
   const auto writes = golden::table_writes(table);
   const size_t per = static_cast<size_t>(c.chunk_bytes) / 4;
   const double start = client.now();
@@ -561,12 +564,14 @@ void write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
     for (;;) {
       const Reply r = client.request(kTable, 1, static_cast<uint16_t>(first), payload);
       if (r.code == kOk) break;
+      if (r.code == kBusy || r.code == kNoSession) return false;
       // The engine may need a moment to drop what an older session left.
       if (r.code != kNotReady || client.now() - start > client.timeout()) {
         throw LinkError(client.where() + ": the plane table was refused: " + code_name(r.code));
       }
     }
   }
+  return true;
 }
 
 LinkFigures run_link_tiles(Client& client, const Capabilities& chip, const std::vector<golden::PlaneEntry>& table,

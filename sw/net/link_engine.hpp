@@ -31,15 +31,15 @@ struct LinkFigures {
   std::vector<uint32_t> counters_before, counters_after;
 };
 
-// A READ range or window as bytes. Exposed for tests and the link's benchmark.
+// Payloads. Exposed for tests and the link's benchmark.
 Bytes start_payload(const ArbiterConfig& c, const golden::TileJob& job, uint16_t table);
 std::vector<Bytes> row_chunks(const ArbiterConfig& c, const LinkTile& tile);
 Bytes read_payload(uint16_t count, uint16_t keep);
 // One chunk of cells; false if a cell cannot come from this tile.
 bool decode_cells(const ArbiterConfig& c, const golden::TileJob& job, const Bytes& bytes, size_t first,
                   std::vector<golden::MapCell>& cells);
-// Writes the plane table as table 1 of a fresh session. LinkError if the chip refuses it.
-void write_table(Client& client, const ArbiterConfig& c, const std::vector<golden::PlaneEntry>& table);
+// Writes the plane table as table 1 of a fresh session. False if the session was lost; LinkError if the chip refuses.
+bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golden::PlaneEntry>& table);
 
 // Tiles 0 .. count-1. `input` is called in order, once for each tile and again for those that have to be repeated;
 // `output` once for each, in order; `progress` with cells received. The session is opened and closed here.

@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: Apache-2.0
+// The host's side of the link against the model of the chip: the map over the link is the map of the bit-true model,
+// whatever happens on the wire, or there is an error that says what happened. All in simulated time.
+#include <memory>
+#include <random>
+#include <string>
+
+#include "core/error.hpp"
+#include "golden/psweep.hpp"
+#include "model/simulated_link.hpp"
+#include "net/link_engine.hpp"
+#include "net/udp_transport.hpp"
+#include "plan/planner.hpp"
+#include "support/catch.hpp"
+
+using namespace psweep;
+using net::Bytes;
+
+namespace {
+
+// 40x30 cells in several tiles; small chunks, so that a tile has many.
+net::ArbiterConfig small_chip() {
+  net::ArbiterConfig c;
+  c.engine.img_cols = 36;
+  c.engine.img_rows = 24;
+  c.engine.plane_cols = 17;
+  c.engine.plane_rows = 11;
+  c.engine.planes = 16;
+  c.engine.window = 5;
+  c.clk_khz = 60000;
+  c.chunk_bytes = 90;
+  c.session_ms = 5000;
+  return c;
+}
+
+struct Scene {
+  SweepSetup setup;
+  Gray left, right;
+  Plan plan;
+  Image<golden::MapCell> expected;
+
+  explicit Scene(const net::ArbiterConfig& chip, uint32_t seed = 1) {
+    setup.rig.width = 40;
+    setup.rig.height = 30;
+    setup.rig.left = setup.rig.right = {43, 43, 19.5, 14.5};
+    setup.rig.baseline = 0.2;
+    setup.spacing = {9, 1.0, 4.0};
+    setup.format = chip.engine;
+    setup.threshold = threshold_for(setup.format, 0.6);
+    std::mt19937 random(seed);
+    left = right = Gray(40, 30);
+    for (auto& v : left.data) v = static_cast<uint8_t>(random() % 256);
+    for (int y = 0; y < 30; ++y) {
+      for (int x = 0; x < 40; ++x) {
+        right.at(x, y) = static_cast<uint8_t>((left.at(std::min(x + 4, 39), y) * 7 + random() % 256) / 8);
+        if (x > 20 && y > 15) left.at(x, y) = right.at(x, y) = 77;
+      }
+    }
+    const TileSize size = largest_tile(setup);
+    plan = plan_tiles(setup, size.cols, size.rows);
+    std::vector<std::vector<golden::MapCell>> cells;
+    for (size_t i = 0; i < plan.tiles.size(); ++i) {
+      const net::LinkTile t = tile(static_cast<int>(i));
+      cells.push_back(golden::run_tile(setup.format, t.job, plan.table, t.left, t.right).cells);
+    }
+    expected = assemble(setup.rig, plan, cells);
+  }
+  net::LinkTile tile(int i) const {
+    const PlacedTile& t = plan.tiles[i];
+    return {t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+            cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+  }
+};
+
+struct Transfer {
+  std::vector<std::vector<golden::MapCell>> cells;
+  net::LinkFigures figures;
+  net::LinkStatistics statistics;
+  int repeated = 0;  // tiles handed out more than once
+};
+
+Transfer transfer(SimulatedLink& link, const Scene& scene, const net::LinkOptions& options = {}, double timeout = 10,
+                  uint64_t seed = 7) {
+  net::Client client(link, timeout, seed);
+  const net::Capabilities chip = client.info();
+  Transfer out;
+  out.cells.resize(scene.plan.tiles.size());
+  int highest = -1;
+  uint64_t progress = 0;
+  out.figures = net::run_link_tiles(
+      client, chip, scene.plan.table, static_cast<int>(scene.plan.tiles.size()), options,
+      [&](int i) {
+        out.repeated += i <= highest;
+        highest = std::max(highest, i);
+        return scene.tile(i);
+      },
+      [&](int i, std::vector<golden::MapCell> cells) { out.cells[i] = std::move(cells); },
+      [&](uint64_t cells) { progress = cells; });
+  out.statistics = client.statistics();
+  uint64_t all = 0;
+  for (const auto& t : scene.plan.tiles) all += golden::unload_clocks(t.job);
+  CHECK(progress == all);
+  return out;
+}
+
+void check_map(const Scene& scene, const Transfer& t) {
+  const auto map = assemble(scene.setup.rig, scene.plan, t.cells);
+  REQUIRE(map.data.size() == scene.expected.data.size());
+  size_t wrong = 0;
+  for (size_t i = 0; i < map.data.size(); ++i) wrong += map.data[i] != scene.expected.data[i];
+  CHECK(wrong == 0);
+}
+
+std::string failure(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const net::LinkError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+}  // namespace
+
+TEST_CASE("a perfect link brings the map of the model, with no packet sent twice", "[net]") {
+  net::ArbiterConfig c = small_chip();
+  struct Variant {
+    int chunk_bytes, row_slots, map_depth, in_flight, pix_bits;
+  };
+  const auto v = GENERATE(values<Variant>({{90, 0, 0, 2, 8},
+                                           {90, 0, 0, 1, 8},
+                                           {1408, 0, 0, 2, 8},
+                                           {1440, 2, 40, 2, 8},
+                                           {90, 2, 0, 2, 8},
+                                           {90, 3, 50, 2, 8},
+                                           {16, 33, 11, 1, 8},
+                                           {61, 5, 64, 2, 9},
+                                           {90, 0, 0, 2, 12}}));
+  CAPTURE(v.chunk_bytes, v.row_slots, v.map_depth, v.in_flight, v.pix_bits);
+  c.chunk_bytes = v.chunk_bytes;
+  c.row_slots = v.row_slots;
+  c.map_depth = v.map_depth;
+  c.engine.pix_bits = v.pix_bits;
+  const Scene scene(c);
+  REQUIRE(scene.plan.tiles.size() >= 4);
+  golden::Arbiter chip(c);
+  SimulatedLink link(chip, {}, 1);
+  net::LinkOptions options;
+  options.in_flight = v.in_flight;
+  const Transfer t = transfer(link, scene, options);
+  check_map(scene, t);
+  CHECK(t.repeated == 0);
+  CHECK(t.statistics.lost == 0);
+  CHECK(t.statistics.malformed == 0);
+  CHECK(t.statistics.foreign == 0);
+  CHECK(t.statistics.sessions == 1);
+  CHECK(t.statistics.rtt > 0);
+  CHECK_FALSE(chip.session_open());
+  uint64_t clocks = 0;
+  for (const auto& tile : scene.plan.tiles) clocks += golden::engine_clocks(c.engine, tile.job);
+  CHECK(t.figures.engine_clocks == clocks);
+  if (v.map_depth == 0) {  // a ring is asked for in pieces, which may overlap
+    CHECK(t.statistics.duplicates == 0);
+    CHECK(chip.counter(net::kChunksRepeated) == 0);
+  }
+  CHECK(chip.counter(net::kChunksRefused) == 0);
+}
+
+TEST_CASE("faults on the wire: the identical map", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  const Scene scene(c);
+  const double rate = GENERATE(0.01, 0.1);
+  const std::string kind =
+      GENERATE(as<std::string>{}, "loss", "duplication", "reordering", "delay", "corruption", "all");
+  const bool one_way = kind == "all";
+  LinkFaults f;
+  if (kind == "loss" || one_way) f.loss = rate;
+  if (kind == "duplication" || one_way) f.duplication = rate;
+  if (kind == "reordering" || one_way) f.reordering = rate;
+  if (kind == "delay" || one_way) f.delay = rate;
+  if (kind == "corruption" || one_way) f.corruption = rate;
+  uint64_t faults = 0;
+  for (uint32_t run = 0; run < 6; ++run) {
+    const uint32_t seed = test_seed() * 1000 + run;
+    INFO(kind << " " << rate << ", seed " << seed);
+    net::ArbiterConfig variant = c;
+    if (run % 3 == 1) variant.row_slots = 4, variant.map_depth = 60;
+    golden::Arbiter chip(variant);
+    SimulatedLink link(chip, f, seed);
+    net::LinkOptions options;
+    options.in_flight = run % 2 ? 1 : 2;
+    const Transfer t = transfer(link, scene, options, 10, seed);
+    check_map(scene, t);
+    CHECK(t.statistics.malformed == 0);
+    CHECK(t.repeated == 0);
+    faults += link.dropped + link.corrupted + t.statistics.duplicates + t.statistics.foreign;
+  }
+  CAPTURE(faults);
+  if (kind == "loss" || kind == "corruption" || kind == "all") CHECK(faults > 0);
+}
+
+TEST_CASE("40 % of all packets lost", "[net]") {
+  const Scene scene(small_chip());
+  golden::Arbiter chip(small_chip());
+  LinkFaults f;
+  f.loss = 0.4;
+  SimulatedLink link(chip, f, test_seed());
+  const Transfer t = transfer(link, scene);
+  check_map(scene, t);
+  CHECK(link.dropped > link.sent / 4);
+  CHECK(t.statistics.resent > 0);
+}
+
+TEST_CASE("a pulled cable: the transfer goes on", "[net]") {
+  const Scene scene(small_chip());
+  golden::Arbiter chip(small_chip());
+  chip.set_sweep_time(0.02);
+  const double begin = GENERATE(0.0, 0.003, 0.011, 0.028, 0.05);
+  const double length = GENERATE(0.5, 4.0);  // below the chip's silence timer
+  CAPTURE(begin, length);
+  SimulatedLink link(chip, {}, 1);
+  link.unplugged = {{begin, begin + length}};
+  const Transfer t = transfer(link, scene);
+  check_map(scene, t);
+  CHECK(link.dropped > 0);
+  CHECK(link.now() < begin + length + 3);
+  CHECK(t.statistics.sessions == 1);
+}
+
+TEST_CASE("a pulled cable for longer than the chip's silence timer: new session, only the missing tiles", "[net]") {
+  const Scene scene(small_chip());
+  golden::Arbiter chip(small_chip());
+  chip.set_sweep_time(0.02);
+  SimulatedLink link(chip, {}, 1);
+  link.unplugged = {{0.07, 8.5}};
+  const Transfer t = transfer(link, scene);
+  check_map(scene, t);
+  CHECK(t.statistics.sessions == 2);
+  CHECK(chip.counter(net::kTimeouts) == 1);
+  CHECK(t.repeated >= 1);
+  CHECK(t.repeated <= 3);
+}
+
+TEST_CASE("a chip that is reset: new session, only the missing tiles", "[net]") {
+  const Scene scene(small_chip());
+  golden::Arbiter chip(small_chip());
+  chip.set_sweep_time(0.02);
+  SimulatedLink link(chip, {}, 1);
+  link.resets = GENERATE(values<std::vector<double>>({{0.001}, {0.009}, {0.02}, {0.045}, {0.03, 0.031, 0.07, 0.11}}));
+  const size_t resets = link.resets.size();
+  const Transfer t = transfer(link, scene);
+  check_map(scene, t);
+  CHECK(t.statistics.sessions >= 2);
+  CHECK(t.statistics.sessions <= 1 + resets);
+  CHECK(t.repeated <= static_cast<int>(3 * resets));
+}
+
+TEST_CASE("resets, pulled cables and faults together", "[net]") {
+  const Scene scene(small_chip());
+  LinkFaults f;
+  f.loss = f.duplication = f.reordering = f.delay = 0.05;
+  int several = 0;
+  for (uint32_t run = 0; run < 8; ++run) {
+    const uint32_t seed = test_seed() * 1000 + run;
+    INFO("seed " << seed);
+    std::mt19937 random(seed);
+    auto moment = [&random] { return 1e-4 * static_cast<double>(random() % 3000); };
+    golden::Arbiter chip(small_chip());
+    chip.set_sweep_time(0.02);
+    SimulatedLink link(chip, f, seed);
+    link.resets = {moment(), moment()};
+    std::sort(link.resets.begin(), link.resets.end());
+    const double pulled = moment();
+    link.unplugged = {{pulled, pulled + 6}};
+    const Transfer t = transfer(link, scene, {}, 10, seed);
+    check_map(scene, t);
+    several += t.statistics.sessions > 1;
+  }
+  CHECK(several > 4);
+}
+
+TEST_CASE("nobody answers: an error that says who, what and for how long", "[net]") {
+  const Scene scene(small_chip());
+  golden::Arbiter chip(small_chip());
+  SimulatedLink link(chip, {}, 1);
+  SECTION("from the start") {
+    link.unplugged = {{0, 1e9}};
+    const std::string text = failure([&] { transfer(link, scene, {}, 3); });
+    CHECK_THAT(text, contains("udp://simulated:20563: no valid answer for 3.") && contains("INFO"));
+    CHECK(link.now() < 4);
+  }
+  SECTION("in the middle") {
+    chip.set_sweep_time(0.02);
+    link.unplugged = {{0.05, 1e9}};
+    const std::string text = failure([&] { transfer(link, scene, {}, 3); });
+    CHECK_THAT(text, contains("udp://simulated:20563: no valid answer for 3.") && contains("map of tile"));
+    CHECK(link.now() < 5.5);
+  }
+}
+
+TEST_CASE("another host has the session", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  const Scene scene(c);
+  golden::Arbiter chip(c);
+  SimulatedLink link(chip, {}, 1);
+  net::Header h;
+  h.type = net::kOpen;
+  Bytes open = net::encode(h);
+  net::append32(open, 0x12345678);
+  const auto opened = link.foreign(open);
+  REQUIRE(opened.size() == 1);
+  REQUIRE(opened[0][10] == net::kOk);
+  SECTION("and keeps it") {
+    double last = 0;
+    link.meddle = [&](double now, std::vector<Bytes>&) {
+      if (now < last + 1) return;
+      last = now;
+      h.type = net::kStatus;
+      h.token = net::get32(opened[0], 4);
+      const auto reply = chip.message(net::encode(h), 2);
+      CHECK(reply.size() == 1);
+    };
+    const std::string text = failure([&] { transfer(link, scene); });
+    CHECK_THAT(text, contains("another host has the session"));
+    CHECK(link.now() < 8);
+  }
+  SECTION("and falls silent") {
+    const Transfer t = transfer(link, scene);
+    check_map(scene, t);
+    CHECK(link.now() > 4.9);
+    CHECK(link.now() < 7);
+  }
+}
+
+TEST_CASE("a tile that fails is an error with its number and the engine's bits", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  Scene scene(c);
+  golden::Arbiter chip(c);
+  SimulatedLink link(chip, {}, 1);
+  SECTION("refused") {
+    scene.plan.tiles[2].job.tile_cols = c.engine.plane_cols + 1;
+    const std::string text = failure([&] { transfer(link, scene); });
+    CHECK_THAT(text, contains("tile 2: refused or dropped by the engine") && contains("config"));
+  }
+  SECTION("samples outside the window") {
+    const size_t tile = GENERATE(0, 2);
+    scene.plan.tiles[tile].job.tx_left += 3 << golden::kPosFrac;
+    const std::string text = failure([&] { transfer(link, scene); });
+    CHECK_THAT(text, contains("window") && contains("samples outside the loaded window"));
+  }
+}
+
+TEST_CASE("an older session's errors are not ours", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  const Scene good(c);
+  Scene bad(c);
+  golden::Arbiter chip(c);
+  SimulatedLink link(chip, {}, 1);
+  bad.plan.tiles[0].job.tx_left += 3 << golden::kPosFrac;
+  CHECK_THAT(failure([&] { transfer(link, bad); }), contains("window"));
+  check_map(good, transfer(link, good));
+}
+
+TEST_CASE("foreign, stale and malformed packets are counted, not believed", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  const Scene scene(c);
+  golden::Arbiter chip(c);
+  chip.set_sweep_time(0.005);
+  SimulatedLink link(chip, {}, 1);
+  std::mt19937 random(test_seed());
+  // Somebody who sees nothing of the traffic, but knows the protocol and the chip; he cannot know the token.
+  uint64_t thrown = 0;
+  double last = 0;
+  link.meddle = [&](double now, std::vector<Bytes>& extra) {
+    if (now < last + 20e-6) return;
+    last = now;
+    for (int i = 0; i < 3; ++i) {
+      net::Header h;
+      const uint8_t types[] = {net::kMap,
+                               net::kWrite | net::kReply,
+                               net::kStatus | net::kReply,
+                               net::kRead | net::kReply,
+                               net::kStart | net::kReply,
+                               static_cast<uint8_t>(random())};
+      h.type = types[random() % 6];
+      h.token = static_cast<uint32_t>(random());
+      h.sequence = static_cast<uint16_t>(random());
+      h.flags = static_cast<uint8_t>(random() % 6);
+      h.tile = static_cast<uint16_t>(random() % 4);
+      h.index = static_cast<uint16_t>(random() % 10);
+      Bytes m = net::encode(h);
+      m.resize(net::kHeaderBytes + (random() % 2 ? 88 : random() % 200));
+      for (size_t k = net::kHeaderBytes; k < m.size(); ++k) m[k] = static_cast<uint8_t>(random());
+      if (random() % 8 == 0) m.resize(random() % net::kHeaderBytes);
+      extra.push_back(m);
+      ++thrown;
+    }
+  };
+  const Transfer t = transfer(link, scene);
+  check_map(scene, t);
+  CHECK(thrown > 1000);
+  CHECK(t.statistics.malformed + t.statistics.foreign >= thrown / 2);
+}
+
+TEST_CASE("100,000 random and mutated packets: an identical or refused transfer, never a crash or a hang", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  const Scene scene(c);
+  std::mt19937 random(test_seed());
+  uint64_t thrown = 0;
+  int finished = 0, refused = 0;
+  // Mutations of true replies with true tokens: more than the checksums of a real network let through, so a wrong cell
+  // may be believed; but nothing may be read or written outside, and it must end.
+  while (thrown < 100000) {
+    golden::Arbiter chip(c);
+    chip.set_sweep_time(0.002);
+    SimulatedLink link(chip, {}, static_cast<uint32_t>(random()));
+    net::Client client(link, 2, random());
+    const net::Capabilities capabilities = client.info();
+    Bytes latest;
+    struct Spy : net::Transport {
+      SimulatedLink& link;
+      std::mt19937& random;
+      uint64_t& thrown;
+      Bytes latest;
+      Spy(SimulatedLink& l, std::mt19937& r, uint64_t& t) : link(l), random(r), thrown(t) {}
+      void send(const Bytes& m) override { link.send(m); }
+      double now() override { return link.now(); }
+      std::string peer() const override { return link.peer(); }
+      std::optional<Bytes> receive(double timeout) override {
+        if (random() % 2 == 0 && !latest.empty()) {
+          ++thrown;
+          Bytes m = latest;
+          switch (random() % 5) {
+            case 0:
+              m.resize(random() % (m.size() + 1));
+              break;
+            case 1:
+              m.resize(random() % 1600, static_cast<uint8_t>(random()));
+              break;
+            case 2:
+              m[random() % std::min<size_t>(m.size(), 16)] = static_cast<uint8_t>(random());
+              break;
+            case 3:
+              for (auto& b : m) b = static_cast<uint8_t>(random());
+              break;
+            default:
+              for (int i = 0; i < 4; ++i) m[random() % m.size()] ^= static_cast<uint8_t>(1 << random() % 8);
+          }
+          return m;
+        }
+        auto m = link.receive(timeout);
+        if (m && !m->empty()) latest = *m;
+        return m;
+      }
+    } spy(link, random, thrown);
+    net::Client fuzzed(spy, 2, random());
+    try {
+      net::run_link_tiles(
+          fuzzed, capabilities, scene.plan.table, static_cast<int>(scene.plan.tiles.size()), {},
+          [&](int i) { return scene.tile(i); }, [](int, const std::vector<golden::MapCell>&) {}, [](uint64_t) {});
+      ++finished;
+    } catch (const net::LinkError&) {
+      ++refused;
+    }
+    REQUIRE(link.now() < 600);
+  }
+  CAPTURE(finished, refused);
+  CHECK(finished + refused > 0);
+  CHECK(thrown >= 100000);
+}
+
+TEST_CASE("capabilities that contradict themselves are not believed", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  golden::Arbiter chip(c);
+  net::Header h;
+  h.type = net::kInfo;
+  const auto reply = chip.message(net::encode(h), 1);
+  REQUIRE(reply.size() == 1);
+  std::vector<uint32_t> words;
+  for (size_t at = net::kHeaderBytes; at < reply[0].size(); at += 4) words.push_back(net::get32(reply[0], at));
+  const auto good = net::parse_info(words);
+  REQUIRE(good.has_value());
+  CHECK(good->config.engine.planes == 16);
+  CHECK(good->config.chunk_pairs() == 45);
+  CHECK(good->config.row_slots == c.slots());
+  CHECK(good->config.map_depth == 17 * 11);
+  CHECK(good->mac == 0x020000000001);
+  net::ArbiterConfig built = c;
+  built.row_slots = c.slots();
+  built.map_depth = 17 * 11;
+  CHECK(net::same_capabilities(good->config, built));
+  for (const int word : {0, 1, 5, 6, 7, 10, 11, 13, 16, 17, 18, 19, 20, 21, 22, 23, 24, 26}) {
+    INFO("word " << word);
+    auto w = words;
+    w[word] = 0xffffffff;
+    CHECK_FALSE(net::parse_info(w).has_value());
+    w[word] = 0;
+    CHECK_FALSE(net::parse_info(w).has_value());
+  }
+  words.pop_back();
+  CHECK_FALSE(net::parse_info(words).has_value());
+}
+
+TEST_CASE("addresses on the command line", "[net]") {
+  CHECK(net::parse_endpoint("--engine", "udp://10.0.0.2").host == "10.0.0.2");
+  CHECK(net::parse_endpoint("--engine", "udp://10.0.0.2").port == net::kUdpPort);
+  CHECK(net::parse_endpoint("--engine", "udp://rover.local:1234").port == 1234);
+  for (const char* text : {"udp://", "udp://:5", "udp://a:", "udp://a:0", "udp://a:65536", "udp://a:1x", "tcp://a", "a",
+                           "udp://a/b", "udp://a:123456"}) {
+    INFO(text);
+    CHECK_THROWS_AS(net::parse_endpoint("--engine", text), InputError);
+  }
+}
