@@ -55,6 +55,11 @@ bench: setup ## Speed of the float reference, the bit-true model and the simulat
 	@scripts/build.sh psweep psweep_bench
 	@scripts/bench.sh
 
+.PHONY: formal
+formal: ## Prove properties of the clock crossings and other small circuits, and find the faults put into them
+	@scripts/setup.sh build formal
+	@scripts/formal.sh
+
 .PHONY: lint
 lint: ## Check texts, VHDL, C++ layout, converted Verilog, scripts and folders
 	@scripts/setup.sh build lint

@@ -1,0 +1,150 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Proofs of small circuits: what tb/formal/<name>.sv asserts holds for ever, whatever comes in. Ends with
+# 'N passed, N failed'; exit code 1 if anything failed.
+#
+#   scripts/formal.sh [NAME ...]      default: all
+#
+# GHDL makes Verilog of the entity, Yosys joins it with the assertions, ABC's pdr looks for a proof by induction (it finds
+# the invariants itself) or a counterexample. Each clock edge becomes a step in which the clock's input is '1', so that
+# several clocks tick in any order. Start: all registers zero (tb/formal/*.sv say what they assume beyond).
+# Each proof is followed by faults put into the VHDL one by one: the prover has to find every one of them.
+# Environment: VERBOSE=1 shows the tools' messages. Work files in build/formal.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+case "${1:-}" in
+  -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
+esac
+
+for program in ghdl yosys; do
+  command -v $program > /dev/null || { echo "formal: $program is not installed; see scripts/setup.sh formal"; exit 1; }
+done
+# Yosys brings ABC along, as a program of its own or as Debian's.
+abc=$(command -v yosys-abc || command -v berkeley-abc) || { echo "formal: no ABC (yosys-abc, berkeley-abc)"; exit 1; }
+
+root=$PWD/build/formal
+limit=100  # seconds a run
+passed=0
+failed=0
+wanted=("$@")
+used=0
+
+# build_and_prove DIR TOP GENERICS EXPOSED FILE..: prints 'proved', 'found' (a counterexample) or what went wrong.
+build_and_prove() {
+  local dir=$1 top=$2 generics=$3 exposed=$4 name synchroniser='' signals='' signal
+  shift 4
+  name=${dir##*/}
+  name=${name%%.*}
+  # shellcheck disable=SC2086
+  {
+    ghdl -a --std=93c --workdir="$dir" "$@" &&
+      ghdl --synth --std=93c --no-formal --workdir="$dir" --out=verilog $generics "$top" > "$dir/raw.v"
+  } > "$dir/ghdl.log" 2>&1 || { echo "GHDL failed: $dir/ghdl.log"; return; }
+  sed -E 's/always @\(posedge (\w+)\)/always @($global_clock) if (\1)/' "$dir/raw.v" > "$dir/steps.v"
+  if grep -qE 'posedge|negedge' "$dir/steps.v"; then echo "an edge in $dir/raw.v was not understood"; return; fi
+  # A synchroniser of ideal flip-flops would prove too much.
+  synchroniser=$(sed -nE 's/^module (cdc_sync_\w+).*/\1/p' "$dir/steps.v")
+  for signal in $exposed; do signals+=" $top/w:$signal"; done
+  {
+    echo "read_verilog -formal -sv $dir/steps.v"
+    if [ -n "$synchroniser" ]; then
+      echo "delete $synchroniser"
+      echo "read_verilog -formal -sv tb/formal/cdc_sync_model.sv"
+      echo "rename cdc_sync_model $synchroniser"
+    fi
+    if [ -n "$signals" ]; then echo "expose$signals"; fi
+    echo "read_verilog -formal -sv tb/formal/$name.sv"
+    echo "prep -top proof -flatten"
+    echo "opt -full"
+    echo "setundef -init -zero"
+    echo "setundef -undriven -anyseq"
+    # No assertion may get lost on the way.
+    echo "select -assert-min 1 t:\$assert"
+    echo "techmap"
+    echo "opt -fast"
+    echo "abc -g AND -fast"
+    echo "opt_clean"
+    echo "write_aiger -zinit $dir/proof.aig"
+  } > "$dir/proof.ys"
+  yosys -q -l "$dir/yosys.log" "$dir/proof.ys" > /dev/null 2>&1 || { echo "Yosys failed: $dir/yosys.log"; return; }
+  timeout $limit "$abc" -c "read_aiger $dir/proof.aig; fold; pdr" > "$dir/abc.log" 2>&1 || true
+  if [ -n "${VERBOSE:-}" ]; then cat "$dir/abc.log" >&2; fi
+  if grep -q 'Property proved' "$dir/abc.log"; then
+    echo proved
+  elif grep -q 'was asserted in frame' "$dir/abc.log"; then
+    echo found
+  else
+    echo "no answer: $dir/abc.log"
+  fi
+}
+
+report() { # report WANTED ANSWER BEGUN TEXT
+  local words=$2
+  if [ "$2" = "$1" ]; then
+    passed=$((passed + 1))
+    if [ "$1" = found ]; then words='fault found'; fi
+  else
+    failed=$((failed + 1))
+    if [ "$2" = proved ]; then words='FAILED: fault not found'; fi
+    if [ "$2" = found ]; then words='FAILED: counterexample'; fi
+    if [ "$words" = "$2" ]; then words="FAILED: $2"; fi
+  fi
+  printf 'formal: %s: %s (%d ms)\n' "$4" "$words" $((($(date +%s%N) - $3) / 1000000))
+}
+
+# proof NAME TOP GENERICS EXPOSED 'FILE ..' [FILE DESCRIPTION SED]..: the proof, and faults as edits of one of the files.
+proof() {
+  local name=$1 top=$2 generics=$3 exposed=$4 files=() file dir begun number=0
+  read -r -a files <<< "$5"
+  shift 5
+  if [ ${#wanted[@]} -gt 0 ] && ! printf '%s\n' "${wanted[@]}" | grep -qxF "$name"; then return; fi
+  used=$((used + 1))
+  dir=$root/$name
+  rm -rf "$dir" "$dir".*
+  mkdir -p "$dir"
+  begun=$(date +%s%N)
+  report proved "$(build_and_prove "$dir" "$top" "$generics" "$exposed" "${files[@]}")" "$begun" "$name"
+  while [ $# -ge 3 ]; do
+    number=$((number + 1))
+    dir=$root/$name.$number
+    mkdir -p "$dir"
+    begun=$(date +%s%N)
+    sed -E "$3" "$1" > "$dir/$(basename "$1")"
+    if cmp -s "$1" "$dir/$(basename "$1")"; then
+      report found "the fault does not fit $1" "$begun" "$name, $2"
+    else
+      local mutated=()
+      for file in "${files[@]}"; do
+        if [ "$file" = "$1" ]; then mutated+=("$dir/$(basename "$1")"); else mutated+=("$file"); fi
+      done
+      report found "$(build_and_prove "$dir" "$top" "$generics" "$exposed" "${mutated[@]}")" "$begun" "$name, $2"
+    fi
+    shift 3
+  done
+}
+
+proof async_fifo async_fifo '-gG_DATA_W=1 -gG_DEPTH_LOG2=2' \
+  'w_take r_take w_hold r_hold w_gray r_gray w_gray_at_r r_gray_at_w' \
+  'rtl/psweep_pkg.vhd rtl/cdc_sync.vhd rtl/async_fifo.vhd' \
+  rtl/async_fifo.vhd 'pointers in binary' 's/v_count xor .*downto 1\)\)/v_count/' \
+  rtl/async_fifo.vhd 'written when full' 's/w_take +<= w_valid and not w_full and/w_take <= w_valid and/' \
+  rtl/async_fifo.vhd 'pointer cleared by its own reset' 's/w_clear <= w_answer or/w_clear <= w_rst or w_answer or/' \
+  rtl/async_fifo.vhd 'request ends before the jump' "s/w_answer = '1' and w_zero = '1'/w_answer = '1'/" \
+  rtl/async_fifo.vhd 'request during the last answer' "s/and r_answer \/= '1' then/then/" \
+  rtl/async_fifo.vhd 'reader works during the answer' 's/(r_hold +<= r_rst or r_request) or r_answer/\1/' \
+  rtl/async_fifo.vhd 'address without the fold' 's/gray\(C_TOP\) xor gray\(C_TOP - 1\)/gray(C_TOP - 1)/'
+
+proof stream_reg stream_reg '-gG_DATA_W=3' '' 'rtl/psweep_pkg.vhd rtl/stream_reg.vhd' \
+  rtl/stream_reg.vhd 'skid not emptied' "/main_valid <= skid_valid or s_fire/{n;s/'0'/skid_valid/}" \
+  rtl/stream_reg.vhd 'input before skid' 's/main_data <= skid_data/main_data <= s_tdata/'
+
+proof crc_step crc_step '' '' 'rtl/eth_pkg.vhd tb/formal/crc_step.vhd' \
+  rtl/eth_pkg.vhd 'one coefficient missing' 's/EDB88320/EDB88300/' \
+  rtl/eth_pkg.vhd 'residue of the other bit order' 's/DEBB20E3/C704DD7B/'
+
+if [ $used -ne ${#wanted[@]} ] && [ ${#wanted[@]} -gt 0 ]; then
+  echo "formal: unknown name among: ${wanted[*]}"
+  failed=$((failed + 1))
+fi
+echo "$passed passed, $failed failed"
+[ $failed -eq 0 ]
