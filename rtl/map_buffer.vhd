@@ -2,8 +2,9 @@
 -- map_buffer: the map of one tile, written as the engine unloads it, read in chunks as bytes (docs/protocol.md, 'Data').
 --   Whole    : G_DEPTH >= G_CELLS: cell n at word n, always room. keep means nothing
 --   Ring     : G_DEPTH < G_CELLS, a multiple of G_CHUNK_CELLS: cell n at word n mod G_DEPTH. A chunk is begun when all
---              chunks that lie G_DEPTH cells or more before it are below keep. keep belongs to the map inside: 0 in the
---              clock after started, larger when the host asks; a keep that falls is ignored until the next map
+--              chunks that lie G_DEPTH cells or more before it are below keep. keep belongs to the map inside: 0 in
+--              the clock after started, larger when the host asks; a keep that falls is ignored until the next map.
+--              It must not pass a chunk that is being sent
 --   Write    : a cell per clock; empty: ready. complete after s_tlast, then not ready until release_map or clear
 --   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on: chunk f_chunk may be
 --              started. A jump takes a clock more for each chunk that the start address walks over: from the chunk
@@ -117,8 +118,8 @@ begin
   assert G_CELLS >= 1 and G_CELLS < 2 ** 24 and G_CELLS / G_CHUNK_CELLS < 65535
     report "map_buffer: G_CELLS=" & integer'image(G_CELLS) & " outside 1..16777215 or over 65535 chunks"
     severity failure;
-  assert G_DEPTH >= G_CELLS or (G_DEPTH >= 2 * G_CHUNK_CELLS and G_DEPTH mod G_CHUNK_CELLS = 0)
-    report "map_buffer: G_DEPTH=" & integer'image(G_DEPTH) & " is neither G_CELLS nor two or more chunks"
+  assert G_DEPTH >= G_CELLS or (G_DEPTH >= G_CHUNK_CELLS and G_DEPTH mod G_CHUNK_CELLS = 0)
+    report "map_buffer: G_DEPTH=" & integer'image(G_DEPTH) & " is neither G_CELLS nor one or more chunks"
     severity failure;
 
   -- Write ------------------------------------------------------------------------------------------------------------

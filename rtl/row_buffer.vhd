@@ -322,7 +322,7 @@ begin
   p_status : process (clk)
   begin
     if rising_edge(clk) then
-      b_outside <= to_bit(unsigned('0' & b_index) >= C_BITS);
+      b_outside <= not active or to_bit(unsigned('0' & b_index) >= C_BITS);
       b_bit     <= read_bit(0) and not b_outside;
     end if;
   end process p_status;
