@@ -96,6 +96,38 @@ ordered_json cell_counts(const DepthResult& result) {
           {"removed_by_uniqueness", bits[4]}, {"removed_as_speckle", bits[5]}};
 }
 
+ordered_json link_report(const LinkRun& link) {
+  const net::LinkFigures& f = link.figures;
+  const net::LinkStatistics& s = link.statistics;
+  const double hertz = 1e3 * link.chip.config.clk_khz;
+  auto rate = [&](uint64_t bytes) { return f.seconds > 0 ? 8e-6 * static_cast<double>(bytes) / f.seconds : 0; };
+  auto time = [&](uint64_t clocks) { return static_cast<double>(clocks) / hertz; };
+  return {{"peer", link.peer},
+          {"seconds", f.seconds},
+          {"up_bytes", f.pixel_bytes},
+          {"up_Mbit_per_s", rate(f.pixel_bytes)},
+          {"down_bytes", f.cell_bytes},
+          {"down_Mbit_per_s", rate(f.cell_bytes)},
+          {"packets_sent", s.packets_sent},
+          {"packets_received", s.packets_received},
+          {"resent", s.resent},
+          {"lost", s.lost},
+          {"duplicates", s.duplicates},
+          {"malformed", s.malformed},
+          {"foreign", s.foreign},
+          {"sessions", s.sessions},
+          {"timeouts", s.timeouts},
+          {"rtt_ms", 1e3 * s.rtt},
+          {"rtt_min_ms", 1e3 * s.rtt_min},
+          {"rtt_max_ms", 1e3 * s.rtt_max},
+          {"clk_khz", link.chip.config.clk_khz},
+          {"engine_clocks", f.engine_clocks},
+          {"engine_clocks_by_formula", link.clocks_expected},
+          {"engine_seconds", time(f.engine_clocks)},
+          {"wait_rows_clocks", f.wait_rows_clocks},
+          {"wait_map_clocks", f.wait_map_clocks}};
+}
+
 }  // namespace
 
 void depth_command(const DepthOptions& o) {
@@ -147,7 +179,8 @@ void depth_command(const DepthOptions& o) {
   EngineRun run;
   {
     Progress bar(o.engine, o.quiet);
-    EngineRequest request{o.engine, setup, o.threshold, {}, o.tile, o.configuration, o.threads};
+    EngineRequest request{o.engine,  setup,       o.threshold,   {}, o.tile, o.configuration,
+                          o.threads, o.in_flight, o.link_timeout};
     if (o.mncc_bits) request.rounding.mncc_bits = *o.mncc_bits;
     if (o.frac_bits) request.rounding.frac_bits = *o.frac_bits;
     run = run_engine(request, left, right, [&](size_t done, size_t total) { bar.update(done, total); });
@@ -210,6 +243,7 @@ void depth_command(const DepthOptions& o) {
                 {"seconds_at_300_MHz", clocks / 300e6},
                 {"simulated_clocks_per_second", run.seconds > 0 ? clocks / run.seconds : 0}};
   }
+  if (run.link) j["link"] = link_report(*run.link);
   write_record(out.file("report.json"), record);
   out.commit(output_names());
 
@@ -224,6 +258,18 @@ void depth_command(const DepthOptions& o) {
     const auto clocks = static_cast<double>(run.rtl->clocks_in_all);
     std::printf("configuration %s: %d tiles, %.3f M clocks = %.3f s at 166 MHz, %.3f s at 300 MHz\n",
                 run.rtl->configuration.c_str(), run.tiles, clocks / 1e6, clocks / 166e6, clocks / 300e6);
+  }
+  if (run.link) {
+    const net::LinkFigures& f = run.link->figures;
+    const net::LinkStatistics& s = run.link->statistics;
+    const double mhz = 1e-3 * run.link->chip.config.clk_khz;
+    std::printf(
+        "link %s: %d tiles, %.2f s; %.2f Mbit/s up, %.2f Mbit/s down; lost %llu, resent %llu; %.3f M engine "
+        "clocks = %.3f s at %.0f MHz\n",
+        run.link->peer.c_str(), run.tiles, f.seconds, 8e-6 * static_cast<double>(f.pixel_bytes) / f.seconds,
+        8e-6 * static_cast<double>(f.cell_bytes) / f.seconds, static_cast<unsigned long long>(s.lost),
+        static_cast<unsigned long long>(s.resent), 1e-6 * static_cast<double>(f.engine_clocks),
+        1e-6 * static_cast<double>(f.engine_clocks) / mhz, mhz);
   }
   std::printf("written: %s\n", out.target().c_str());
 }

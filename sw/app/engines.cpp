@@ -6,10 +6,12 @@
 #include <chrono>
 #include <cstdlib>
 #include <limits>
+#include <random>
 #include <thread>
 
 #include "core/error.hpp"
 #include "fast/fast.hpp"
+#include "net/udp_transport.hpp"
 #ifdef PSWEEP_HAVE_RTL
 #include "rtl/rtl_engine.hpp"
 #endif
@@ -59,6 +61,66 @@ EngineRun run_fixed_engine(const Gray& left, const Gray& right, SweepSetup setup
   options.progress = [&](double share) { progress(static_cast<size_t>(share * 1000), 1000); };
   const Image<golden::MapCell> map = run_fixed(left, right, setup, options);
   run.result = to_result(setup, map);
+  run.seconds = since(start);
+  return run;
+}
+
+// Formats decide every bit of the map, so they must be the same; the message names the field and both values.
+void check_chip(const std::string& where, const golden::Config& chip, const SweepSetup& setup) {
+  const golden::Config& f = setup.format;
+  struct Field {
+    const char* option;
+    int chip, request;
+  };
+  for (const Field& x :
+       {Field{"--window", chip.window, f.window}, Field{"pixel bits", chip.pix_bits, f.pix_bits},
+        Field{"--weight-bits", chip.weight_bits, f.weight_bits},
+        Field{"--interp-bits", chip.interp_frac, f.interp_frac}, Field{"--mncc-bits", chip.mncc_bits, f.mncc_bits},
+        Field{"--frac-bits", chip.frac_bits, f.frac_bits}}) {
+    if (x.chip != x.request) {
+      throw InputError(std::string(x.option) + ": found " + std::to_string(x.request) + ", but the chip at " + where +
+                       " has " + std::to_string(x.chip));
+    }
+  }
+  if (setup.spacing.planes > chip.planes) {
+    throw InputError("--planes: found " + std::to_string(setup.spacing.planes) + ", but the chip at " + where +
+                     " has room for " + std::to_string(chip.planes));
+  }
+}
+
+EngineRun run_link_engine(const EngineRequest& r, const Gray& left, const Gray& right, const ProgressCall& progress) {
+  const auto start = Clock::now();
+  const auto transport = net::connect_udp(net::parse_endpoint("--engine", r.engine));
+  std::random_device random;
+  net::Client client(*transport, r.link_timeout, uint64_t{random()} << 32 | random());
+  EngineRun run;
+  LinkRun link;
+  link.peer = transport->peer();
+  link.chip = client.info();
+  check_chip(client.where(), link.chip.config.engine, r.setup);
+  SweepSetup setup = r.setup;
+  setup.format = link.chip.config.engine;
+  const TileSize size = r.tile.empty() ? largest_tile(setup) : parse_tile(r.tile);
+  const Plan plan = plan_tiles(setup, size.cols, size.rows);
+  describe_tiles(plan, run);
+  uint64_t all = 0;
+  for (const auto& t : plan.tiles) all += golden::unload_clocks(t.job);
+  std::vector<std::vector<golden::MapCell>> cells(plan.tiles.size());
+  net::LinkOptions options;
+  options.in_flight = r.in_flight;
+  link.figures = net::run_link_tiles(
+      client, link.chip, plan.table, static_cast<int>(plan.tiles.size()), options,
+      [&](int i) {
+        const PlacedTile& t = plan.tiles[i];
+        return net::LinkTile{t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                             cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+      },
+      [&](int i, std::vector<golden::MapCell> out) { cells[i] = std::move(out); },
+      [&](uint64_t done) { progress(done, all); });
+  for (const auto& t : plan.tiles) link.clocks_expected += golden::engine_clocks(setup.format, t.job);
+  link.statistics = client.statistics();
+  run.link = link;
+  run.result = to_result(setup, assemble(setup.rig, plan, cells));
   run.seconds = since(start);
   return run;
 }
@@ -200,7 +262,8 @@ EngineRun run_engine(const EngineRequest& r, const Gray& left, const Gray& right
     throw InputError("--engine: found 'rtl', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
   }
 #endif
-  throw InputError("--engine: found '" + r.engine + "', expected float, fixed or rtl");
+  if (r.engine.compare(0, 6, "udp://") == 0) return run_link_engine(r, left, right, progress);
+  throw InputError("--engine: found '" + r.engine + "', expected float, fixed, rtl or udp://HOST[:PORT]");
 }
 
 }  // namespace psweep

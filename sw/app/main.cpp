@@ -10,6 +10,8 @@
 #include "app/options.hpp"
 #include "core/error.hpp"
 #include "io/image_io.hpp"
+#include "net/client.hpp"
+#include "net/udp_transport.hpp"
 
 namespace psweep {
 namespace {
@@ -47,6 +49,32 @@ const CLI::Validator kOddWindow(
     },
     "ODD 3..21");
 
+// An engine of this program, or the address of a chip.
+const CLI::Validator kEngine(
+    [](std::string& text) {
+      if (text == "float" || text == "fixed" || text == "rtl") return std::string();
+      try {
+        net::parse_endpoint("", text);
+        return std::string();
+      } catch (const InputError&) {
+        return "found '" + text + "', expected float, fixed, rtl or udp://HOST[:PORT]";
+      }
+    },
+    "{float,fixed,rtl,udp://HOST[:PORT]}");
+
+const CLI::Validator kChip(
+    [](std::string& text) {
+      try {
+        net::parse_endpoint("", text);
+        return std::string();
+      } catch (const InputError&) {
+        return "found '" + text + "', expected udp://HOST[:PORT]";
+      }
+    },
+    "udp://HOST[:PORT]");
+
+const CLI::Validator kSeconds = CLI::Range(0.1, 3600.0);
+
 const CLI::Validator kPositive = CLI::Range(1e-6, 1e9);
 
 void add_depth(CLI::App& app, DepthOptions& o) {
@@ -63,8 +91,15 @@ void add_depth(CLI::App& app, DepthOptions& o) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, Rectify>{{"auto", Rectify::kAuto}, {"yes", Rectify::kYes}, {"no", Rectify::kNo}}));
   c->add_option("-o,--output", o.output, "Directory for the results")->required();
-  c->add_option("--engine", o.engine, "float: reference; fixed: bit-true model; rtl: simulated hardware")
-      ->check(CLI::IsMember({"float", "fixed", "rtl"}))
+  c->add_option("--engine", o.engine,
+                "float: reference; fixed: bit-true model; rtl: simulated hardware; udp: a chip on the network")
+      ->check(kEngine)
+      ->capture_default_str();
+  c->add_option("--in-flight", o.in_flight, "udp: tiles in work at once; 2 sends one while another is swept")
+      ->check(CLI::Range(1, 2))
+      ->capture_default_str();
+  c->add_option("--link-timeout", o.link_timeout, "udp: give up after so many seconds without any answer")
+      ->check(kSeconds)
       ->capture_default_str();
   optional_option(c, "--planes", o.planes, "Number of planes (default 301, or from the disparity range)",
                   CLI::Range(3, 1024));
@@ -92,6 +127,7 @@ void add_depth(CLI::App& app, DepthOptions& o) {
       "Examples:\n"
       "  psweep depth left.png right.png --calib calib.yaml -o out\n"
       "  psweep depth left.png right.png --calib calib.yaml -o out_rtl --engine rtl --config tile --planes 101\n"
+      "  psweep depth left.png right.png --calib calib.yaml -o out_chip --engine udp://192.168.1.80\n"
       "  psweep depth im0.png im1.png --calib calib.txt -o out --cleanup\n"
       "  psweep depth im3.png im4.png --disparity-range 2:16 -o out\n");
   c->callback([&o] { depth_command(o); });
@@ -148,28 +184,59 @@ void add_report(CLI::App& app, ReportOptions& o) {
   c->callback([&o] { report_command(o); });
 }
 
+void add_info(CLI::App& app, InfoOptions& o) {
+  auto* c = app.add_subcommand("info", "Capabilities, state and counters of a chip on the network");
+  c->add_option("CHIP", o.target, "udp://HOST[:PORT]")->required()->check(kChip);
+  c->add_option("--link-timeout", o.link_timeout, "Give up after so many seconds without any answer")
+      ->check(kSeconds)
+      ->capture_default_str();
+  c->add_flag("--json", o.json, "Print JSON");
+  c->footer("Example:\n  psweep info udp://192.168.1.80\n");
+  c->callback([&o] { info_command(o); });
+}
+
+void add_bench_link(CLI::App& app, BenchLinkOptions& o) {
+  auto* c = app.add_subcommand("bench-link", "Goodput and latency of the link to a chip (which must be free)");
+  c->add_option("CHIP", o.target, "udp://HOST[:PORT]")->required()->check(kChip);
+  c->add_option("--seconds", o.seconds, "Length of each of the four measurements")
+      ->check(kSeconds)
+      ->capture_default_str();
+  c->add_option("--link-timeout", o.link_timeout, "Give up after so many seconds without any answer")
+      ->check(kSeconds)
+      ->capture_default_str();
+  c->add_flag("--json", o.json, "Print JSON");
+  c->footer("Example:\n  psweep bench-link udp://192.168.1.80 --seconds 5\n");
+  c->callback([&o] { bench_link_command(o); });
+}
+
 int run(int argc, char** argv) {
   silence_opencv();
-  CLI::App app("Plane-sweep stereo: depth maps by the float reference, the bit-true model or the simulated hardware.");
+  CLI::App app(
+      "Plane-sweep stereo: depth maps by the float reference, the bit-true model, the simulated hardware or a chip.");
   app.set_version_flag("--version", std::string("psweep ") + PSWEEP_VERSION);
   app.require_subcommand(1);
   app.footer(
       "`psweep COMMAND --help` explains a command. Formats: docs/file_formats.md\n"
-      "Exit codes: 0 good, 2 wrong option or input, 1 internal error.\n");
+      "Exit codes: 0 good, 2 wrong option or input, 1 link or internal error.\n");
   DepthOptions depth;
   RenderOptions render;
   EvalOptions eval;
   ReportOptions report;
+  InfoOptions info;
+  BenchLinkOptions bench_link;
   add_depth(app, depth);
 
   add_render(app, render);
   add_eval(app, eval);
   add_report(app, report);
+  add_info(app, info);
+  add_bench_link(app, bench_link);
   try {
     // CLI11 itself would only say that a subcommand is missing.
     if (argc > 1 && argv[1][0] != '-' &&
         app.get_subcommands([&](CLI::App* c) { return c->get_name() == argv[1]; }).empty()) {
-      throw InputError("unknown command '" + std::string(argv[1]) + "', expected depth, render, eval or report");
+      throw InputError("unknown command '" + std::string(argv[1]) +
+                       "', expected depth, render, eval, report, info or bench-link");
     }
     app.parse(argc, argv);
     return 0;
@@ -182,6 +249,9 @@ int run(int argc, char** argv) {
   } catch (const InputError& e) {
     std::fprintf(stderr, "psweep: %s\n", e.what());
     return 2;
+  } catch (const net::LinkError& e) {
+    std::fprintf(stderr, "psweep: %s\n", e.what());
+    return 1;
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "psweep: out of memory\n");
     return 1;

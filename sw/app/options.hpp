@@ -24,7 +24,22 @@ struct DepthOptions {
   std::string configuration;  // name or empty
   int threads = 0;            // 0: one per core
   bool cleanup = false, no_uniqueness = false, no_speckle = false;
+  int in_flight = 2;         // udp: tiles
+  double link_timeout = 10;  // udp: seconds
   bool quiet = false;
+};
+
+struct InfoOptions {
+  std::string target;  // udp://HOST[:PORT]
+  double link_timeout = 10;
+  bool json = false;
+};
+
+struct BenchLinkOptions {
+  std::string target;
+  double seconds = 2;  // of each of the four measurements
+  double link_timeout = 10;
+  bool json = false;
 };
 
 struct RenderOptions {
@@ -54,5 +69,7 @@ void depth_command(const DepthOptions& options);
 void render_command(const RenderOptions& options);
 void eval_command(const EvalOptions& options);
 void report_command(const ReportOptions& options);
+void info_command(const InfoOptions& options);
+void bench_link_command(const BenchLinkOptions& options);
 
 }  // namespace psweep

@@ -66,7 +66,7 @@ std::optional<Capabilities> parse_info(const std::vector<uint32_t>& w) {
   c.config.map_depth = take(23, 1, 1u << 24);
   c.config.session_ms = take(24, 1, 65535);
   c.config.rx_slots = take(25, 1, 4096);
-  c.counters = take(26, 0, kCounterWords);
+  c.counters = take(26, kCounterWords, kCounterWords);
   // What follows from the others must follow: chip and host cut rows and cells into the same chunks.
   good =
       good && w[13] == static_cast<uint32_t>(c.config.cell_bits()) &&
@@ -259,12 +259,12 @@ std::optional<Event> Client::take_map(const Bytes& packet, const Header& h, Sent
                   Bytes(packet.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes), packet.end())};
 }
 
-Reply Client::request(Type type, uint16_t tile, uint16_t index, const Bytes& payload) {
+Reply Client::request(Type type, uint16_t tile, uint16_t index, const Bytes& payload, uint8_t flags) {
   asked_ = now();
   std::vector<uint64_t> orders;
   for (;;) {
     if (!orders.empty()) ++statistics_.resent;
-    orders.push_back(send(type, tile, index, payload));
+    orders.push_back(send(type, tile, index, payload, flags));
     const double until = now() + patience();
     while (now() < until) {
       const auto event = receive(until - now());

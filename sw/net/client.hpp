@@ -92,7 +92,7 @@ class Client {
   Client(Transport& transport, double timeout, uint64_t seed);
 
   // Stop and wait: repeats until answered; other packets that come in between are dropped.
-  Reply request(Type type, uint16_t tile = 0, uint16_t index = 0, const Bytes& payload = {});
+  Reply request(Type type, uint16_t tile = 0, uint16_t index = 0, const Bytes& payload = {}, uint8_t flags = 0);
   Capabilities info();
   std::vector<uint32_t> counters();
   // Opens a session. A busy chip is asked again, for as long as an older session of ours would need to time out.

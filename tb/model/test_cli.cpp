@@ -15,6 +15,7 @@
 #include "io/pfm.hpp"
 #include "io/ply.hpp"
 #include "io/text_file.hpp"
+#include "model/udp_chip.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_dir.hpp"
 
@@ -289,7 +290,7 @@ TEST_CASE("bad input: exit code 2, file and field named, no output", "[cli][erro
   const std::string pair = "depth left.png right.png -o out ", good = pair + "--calib calib.yaml ";
   const std::vector<Case> cases = {
       {"", "subcommand is required"},
-      {"deepth left.png", "unknown command 'deepth', expected depth, render, eval or report"},
+      {"deepth left.png", "unknown command 'deepth', expected depth, render, eval, report, info or bench-link"},
       {"depth left.png -o out --calib calib.yaml", "RIGHT is required"},
       {"depth left.png right.png --calib calib.yaml", "--output is required"},
       {pair, "--calib: found nothing"},
@@ -601,4 +602,143 @@ TEST_CASE("render, depth, eval, report: end to end", "[cli]") {
   CHECK(html.find("RMS error of the depths within 2 cm") != std::string::npos);
   CHECK(html.find("</html>") != std::string::npos);
   CHECK(html.find("src=\"data:image/png;base64,") != std::string::npos);
+}
+
+namespace {
+
+// A chip large enough for the wall, in a process of its own address: 127.0.0.1 and a free port.
+net::ArbiterConfig wall_chip() {
+  net::ArbiterConfig c;
+  c.engine.img_cols = 80;
+  c.engine.img_rows = 60;
+  c.engine.plane_cols = 50;
+  c.engine.plane_rows = 40;
+  c.engine.planes = 32;
+  c.engine.window = 5;
+  c.session_ms = 1500;
+  return c;
+}
+
+}  // namespace
+
+TEST_CASE("psweep depth over UDP writes what the fixed engine writes", "[cli][net]") {
+  const TemporaryDir dir;
+  write_wall(dir, 10);
+  REQUIRE(psweep_run(dir, kInput + std::string("-q -o fixed")).code == 0);
+  net::ArbiterConfig c = wall_chip();
+  std::string options;
+  int drop_every = 0;
+  SECTION("two tiles in flight") {}
+  SECTION("one tile in flight") { options = " --in-flight 1"; }
+  SECTION("small tiles") { options = " --tile 30x20"; }
+  SECTION("small buffers") {
+    c.row_slots = 3;
+    c.map_depth = 800;
+  }
+  SECTION("with losses") { drop_every = 11; }
+  UdpChip chip(c);
+  chip.drop_every = drop_every;
+  const Outcome o = psweep_run(dir, kInput + std::string("-o udp --engine ") + chip.url() + options);
+  INFO(o.out << o.err);
+  REQUIRE(o.code == 0);
+  CHECK_THAT(o.out, contains("Mbit/s up") && contains("engine clocks"));
+  CHECK(names(dir / "udp") == kFiles);
+  int compared = 0;
+  for (const auto& name : kFiles) {
+    if (name == "report.json") continue;
+    INFO(name);
+    CHECK(same_bytes(dir / "udp" / name, dir / "fixed" / name));
+    ++compared;
+  }
+  CHECK(compared == 6);
+  const auto report = nlohmann::json::parse(read_file(dir / "udp/report.json"));
+  const auto& link = report["link"];
+  CHECK(report["tiles"]["count"] >= 2);
+  CHECK(link["engine_clocks"] == link["engine_clocks_by_formula"]);
+  CHECK(link["engine_clocks"] > 0);
+  CHECK(link["up_Mbit_per_s"] > 0);
+  CHECK(link["down_Mbit_per_s"] > 0);
+  CHECK(link["sessions"] == 1);
+  CHECK(link["malformed"] == 0);
+  if (drop_every) CHECK(link["resent"] > 0);
+}
+
+TEST_CASE("psweep info and bench-link", "[cli][net]") {
+  const TemporaryDir dir;
+  UdpChip chip(wall_chip());
+  const Outcome info = psweep_run(dir, "info " + chip.url());
+  INFO(info.out << info.err);
+  REQUIRE(info.code == 0);
+  CHECK_THAT(info.out, contains("plane_cols             50") && contains("engine_wait_rows") && contains("session"));
+  const Outcome parsed = psweep_run(dir, "info --json " + chip.url());
+  REQUIRE(parsed.code == 0);
+  const auto j = nlohmann::json::parse(parsed.out);
+  CHECK(j["capabilities"]["planes"] == 32);
+  CHECK(j["capabilities"]["mac"] == "02:00:00:00:00:01");
+  CHECK(j["state"]["session"] == false);
+  CHECK(j["counters"]["sessions"] == 0);
+  CHECK(j["counters"].size() == 29);
+
+  const Outcome bench = psweep_run(dir, "bench-link --seconds 0.3 --json " + chip.url());
+  INFO(bench.err);
+  REQUIRE(bench.code == 0);
+  const auto b = nlohmann::json::parse(bench.out);
+  for (const char* name : {"up_Mbit_per_s", "down_Mbit_per_s", "both_up_Mbit_per_s", "both_down_Mbit_per_s"}) {
+    INFO(name);
+    CHECK(b[name] > 0);
+  }
+  CHECK(b["latency_us"]["questions"] > 0);
+  CHECK(b["latency_us"]["median"] <= b["latency_us"]["max"]);
+  const Outcome table = psweep_run(dir, "bench-link --seconds 0.1 " + chip.url());
+  REQUIRE(table.code == 0);
+  CHECK_THAT(table.out, contains("both at once") && contains("latency"));
+}
+
+TEST_CASE("a chip that cannot serve the request, or none at all", "[cli][net]") {
+  const TemporaryDir dir;
+  write_wall(dir, 10);
+  UdpChip chip(wall_chip());
+  const std::string call = "depth left.png right.png --calib calib.yaml -o out --engine " + chip.url();
+  struct Wrong {
+    std::string options, message;
+  };
+  for (const auto& w :
+       std::vector<Wrong>{{" --planes 31 --window 7", "--window: found 7, but the chip at"},
+                          {" --planes 33 --window 5", "--planes: found 33, but the chip at"},
+                          {" --planes 9 --window 5 --mncc-bits 9", "--mncc-bits: found 9, but the chip"},
+                          {" --planes 9 --window 5 --tile 60x20", "exceeds plane_cols = 50"}}) {
+    const Outcome o = psweep_run(dir, call + w.options);
+    INFO(o.err);
+    CHECK(o.code == 2);
+    CHECK_THAT(o.err, contains(w.message));
+    CHECK_FALSE(fs::exists(dir / "out"));
+  }
+  const std::string silent = "udp://127.0.0.1:" + std::to_string(chip.port());
+  chip.stop();
+  for (const std::string& command :
+       {kInput + std::string("-o out --link-timeout 0.5 --engine "), std::string("info --link-timeout 0.5 "),
+        std::string("bench-link --link-timeout 0.5 ")}) {
+    const Outcome o = psweep_run(dir, command + silent);
+    INFO(o.err);
+    CHECK(o.code == 1);
+    CHECK_THAT(o.err, contains(silent + ": no valid answer for 0."));
+    CHECK_FALSE(fs::exists(dir / "out"));
+  }
+  CHECK(psweep_run(dir, "info http://127.0.0.1").code == 2);
+  CHECK(psweep_run(dir, kInput + std::string("-o out --engine udp://")).code == 2);
+}
+
+TEST_CASE("a killed host: the next one waits for its session to end", "[cli][net]") {
+  const TemporaryDir dir;
+  write_wall(dir, 10);
+  UdpChip chip(wall_chip());
+  chip.sweep_seconds = 0.5;
+  const int killed = std::system(("cd '" + dir.path().string() + "' && timeout -s KILL 0.4 '" PSWEEP_BINARY "' " +
+                                  kInput + "-q -o killed --engine " + chip.url() + " 2>.stderr")
+                                     .c_str());
+  CHECK(killed != 0);
+  chip.sweep_seconds = -1;
+  const Outcome o = psweep_run(dir, kInput + std::string("-q -o out --engine ") + chip.url());
+  INFO(o.err);
+  CHECK(o.code == 0);
 }
