@@ -4,14 +4,16 @@
 --   Frame    : 15 nibbles 5 and one D, the bytes with the low nibble first, zeros up to 60 bytes, FCS
 --   Gap      : full duplex: tx_en is low for exactly 24 nibbles if a frame waits. Half duplex: 24 clocks from the end
 --              of tx_en or crs (of crs: two clocks of synchronisation and two of output come on top). crs in the first
---              16 starts the gap again, in the last 8 it does not; a frame that waits when the gap ends goes out
---              whatever crs says then (4.2.3.2.1).
+--              15 starts the gap again, later it does not; a frame that waits when the gap ends goes out whatever crs
+--              says then (4.2.3.2.1, where the first part is up to 2/3 of the gap).
 --   Collision: col in nibble 0 .. 127 of a transmission (preamble included): preamble and SFD are completed, then come
 --              8 nibbles of jam (all 5), and the frame is sent again after 0 .. 2**min(n, 10) - 1 slots of 128 nibbles
 --              from the end of the jam and a gap, n = number of its collisions; given up at the 16th. From nibble 128
 --              on: jam, not sent again. Not seen are collisions of the last four nibbles of a frame, which are late.
---   Random   : free-running LFSR of 17 bits (x**17 + x**14 + 1) from G_SEED. What is sent stirs it: stations of the
---              same seed in lock step part ways by their source addresses.
+--   Random   : free-running LFSR of 17 bits (x**17 + x**14 + 1) from G_SEED, stirred by what the RAM says: the preamble
+--              reads bytes 8 .. 15 for that. So stations of the same seed that run in step part ways at the first
+--              collision if their source addresses differ in the last 4 bytes: a byte's two nibbles go in at every
+--              fourth bit, hence at different bits, and cannot cancel.
 --   Slots    : served 0, 1, 0, 1 ..; f_request(s) /= f_done(s): frame waits, f_length_s (14 .. 1514 bytes without FCS)
 --              and its bytes stay still. f_done(s) flips when the frame is over, f_result_s (from the same clock on) is
 --              0 sent, 1 given up after 16 collisions, 2 late collision. collisions flips at each collision.
@@ -186,7 +188,7 @@ begin
       backoff  <= (jam and last_8 and not finish) or (backoff and not waited);
 
       collided <= preamble and (collided or col);
-      padding  <= at_end and not start;
+      padding  <= at_end and data;
       minimum  <= at_60 and not start;
       late     <= at_late and not start;
 
@@ -197,10 +199,14 @@ begin
       end if;
 
       if backoff = '0' then
-        random <= random(15 downto 0) & (random(16) xor random(13) xor txd(0));
+        random     <= random(15 downto 0) & (random(16) xor random(13) xor nibble(0));
+        random(4)  <= random(3) xor nibble(1);
+        random(8)  <= random(7) xor nibble(2);
+        random(12) <= random(11) xor nibble(3);
       end if;
 
       if rst = '1' then
+        pos      <= (others => '0');
         preamble <= '0';
         data     <= '0';
         fcs      <= '0';
@@ -242,7 +248,7 @@ begin
   end process p_answer;
 
   -- Nibbles. In the FCS index 0 shifts the register out.
-  r_addr <= slot & std_logic_vector(pos(11 downto 1));
+  r_addr <= slot & std_logic_vector(pos(11 downto 5)) & (pos(4) or preamble) & std_logic_vector(pos(3 downto 1));
   nibble <= "0000" when p_zero = '1' else r_data(7 downto 4) when p_high = '1' else r_data(3 downto 0);
   index  <= "0000" when p_fcs = '1' else crc(3 downto 0) xor nibble;
 
