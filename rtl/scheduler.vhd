@@ -6,7 +6,8 @@
 --   running   : until map_last; or, if engine_busy falls without it, the tile has failed (refused or dropped): failed
 --               and failed_tile hold until stop. engine_busy has to rise after the start, whenever that is
 --   Job words : job_addr 0..17, written while no tile is staged, in any order; they survive a launch
---   Table     : t_* go to cfg_* in the same clock; only while nothing is staged or running
+--   Table     : t_* go to cfg_* in the same clock; only while nothing is staged or running,
+--               and not in the clock after stop
 --   stop      : everything is forgotten; COMMAND = 6 (abort, clear) one clock later. staged has to fall with it
 --   cfg_*     : as s_cfg of the engine, which is always ready
 --   Golden    : sw/golden/scheduler.hpp
