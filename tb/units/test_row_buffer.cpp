@@ -62,7 +62,7 @@ class Bench : public Agent {
   golden::RowBuffer model;
   Scoreboard pixels{"pixels"}, answers{"answers"}, bits{"bitmap"}, status{"status"};
   int tiles_done = 0, clears = 0, new_chunks = 0, repeated = 0, refused = 0;
-  uint64_t first_clock = 0, last_clock = 0;  // beats of the latest tile
+  uint64_t go_clock = 0, first_clock = 0, last_clock = 0;  // of the latest tile: go, first and last beat
 
   bool ok() const { return pixels.ok() && answers.ok() && bits.ok() && status.ok(); }
   std::string report() const { return pixels.report() + answers.report() + bits.report() + status.report(); }
@@ -122,7 +122,10 @@ class Bench : public Agent {
     sample_output(now);
 
     if (dut.w_commit) model.store(chunk_, data_);
-    if (dut.go) gone_ = true;
+    if (dut.go) {
+      gone_ = true;
+      go_clock = now;
+    }
     if (dut.open_tile) {
       model.open_tile(dut.open_pixels, dut.open_chunks);
       tile_ = true;
@@ -301,6 +304,7 @@ TEST_CASE("row_buffer: a pixel per clock from the first to the last") {
   Bench<Vrow_buffer_8_6_70> bench({8, 6, 70}, {0, 0, 0, 0, true}, 70, test_seed());
   for (int tile = 1; tile <= 10; ++tile) {
     bench.sim.run_until([&] { return bench.tiles_done >= tile; });
+    CHECK(bench.first_clock - bench.go_clock == 3);
     CHECK(bench.last_clock - bench.first_clock + 1 == bench.model.pixels());
   }
   INFO(bench.report());
