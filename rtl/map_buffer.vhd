@@ -8,7 +8,8 @@
 --   Write    : a cell per clock; empty: ready. complete after s_tlast, then not ready until release_map or clear
 --   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on: chunk f_chunk may be
 --              started. A jump takes a clock more for each chunk that the start address walks over: from the chunk
---              after the one sent last if that is not above f_chunk, else from chunk 0. f_chunk may change after f_start
+--              after the one sent last if that is not above f_chunk, else from chunk 0. f_chunk may change once
+--              f_start has been given
 --   Bytes    : ceil(G_CELL_W/8) per cell, big endian, zeros above the cell, and one idle clock after each cell. f_valid
 --              and f_data hold until f_take
 --   RAM      : a part of 9*k bits and one of the rest, because block RAMs are 9, 18, 36 bits wide when shallow and only
