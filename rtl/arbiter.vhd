@@ -124,6 +124,7 @@ architecture rtl of arbiter is
   signal r_data         : std_logic_vector(7 downto 0);
   signal rx_events      : std_logic_vector(15 downto 0);
   signal full_duplex    : std_logic;
+  signal duplex_q       : std_logic;
   signal msg_events     : std_logic_vector(31 downto 0);
   signal pins           : std_logic_vector(1 downto 0);
   signal pins_q         : std_logic_vector(1 downto 0);
@@ -470,6 +471,14 @@ begin
       ev_late      => ev_late
     );
 
+  -- What crosses has to come from a flip-flop: a gate may glitch at the very edge.
+  p_duplex : process (clk)
+  begin
+    if rising_edge(clk) then
+      duplex_q <= full_duplex;
+    end if;
+  end process p_duplex;
+
   u_frames : entity work.ram_dc
     generic map (
       G_DATA_W => 8,
@@ -489,7 +498,7 @@ begin
     port map (
       clk         => tx_clk,
       rst         => tx_rst,
-      full_duplex => full_duplex,
+      full_duplex => duplex_q,
       mii_crs     => mii_crs,
       mii_col     => mii_col,
       mii_txd     => mii_txd,

@@ -5,9 +5,9 @@
 #
 #   scripts/formal.sh [NAME ...]      default: all
 #
-# GHDL makes Verilog of the entity, Yosys joins it with the assertions, ABC's pdr looks for a proof by induction (it finds
-# the invariants itself) or a counterexample. Each clock edge becomes a step in which the clock's input is '1', so that
-# several clocks tick in any order. Start: all registers zero (tb/formal/*.sv say what they assume beyond).
+# GHDL makes Verilog of the entity, Yosys joins it with the assertions, ABC's pdr looks for a proof by induction (it
+# finds the invariants itself) or a counterexample. Each clock edge becomes a step in which the clock's input is '1', so
+# that several clocks tick in any order. Start: all registers zero (tb/formal/*.sv say what they assume beyond).
 # Each proof is followed by faults put into the VHDL one by one: the prover has to find every one of them.
 # Environment: VERBOSE=1 shows the tools' messages. Work files in build/formal.
 set -euo pipefail
@@ -30,7 +30,14 @@ wanted=("$@")
 used=0
 
 # build_and_prove DIR TOP GENERICS EXPOSED FILE..: prints 'proved', 'found' (a counterexample) or what went wrong.
+# TOP check_crossings: the rules of tb/formal/crossings.ys instead of assertions.
 build_and_prove() {
+  if [ "$2" = check_crossings ]; then
+    local folder=$1
+    shift 4
+    check_crossings "$folder" "$@"
+    return
+  fi
   local dir=$1 top=$2 generics=$3 exposed=$4 name synchroniser='' signals='' signal
   shift 4
   name=${dir##*/}
@@ -92,7 +99,7 @@ report() { # report WANTED ANSWER BEGUN TEXT
   printf 'formal: %s: %s (%d ms)\n' "$4" "$words" $((($(date +%s%N) - $3) / 1000000))
 }
 
-# proof NAME TOP GENERICS EXPOSED 'FILE ..' [FILE DESCRIPTION SED]..: the proof, and faults as edits of one of the files.
+# proof NAME TOP GENERICS EXPOSED 'FILE ..' [FILE DESCRIPTION SED]..: the proof, and faults as edits of one file each.
 proof() {
   local name=$1 top=$2 generics=$3 exposed=$4 files=() file dir begun number=0
   read -r -a files <<< "$5"
@@ -141,6 +148,35 @@ proof stream_reg stream_reg '-gG_DATA_W=3' '' 'rtl/psweep_pkg.vhd rtl/stream_reg
 proof crc_step crc_step '' '' 'rtl/eth_pkg.vhd tb/formal/crc_step.vhd' \
   rtl/eth_pkg.vhd 'one coefficient missing' 's/EDB88320/EDB88300/' \
   rtl/eth_pkg.vhd 'residue of the other bit order' 's/DEBB20E3/C704DD7B/'
+
+# check_crossings DIR FILE..: 'proved' or 'found' (a rule of tb/formal/crossings.ys is broken) or what went wrong.
+check_crossings() {
+  local dir=$1
+  shift
+  {
+    ghdl -a --std=93c --workdir="$dir" "$@" &&
+      ghdl --synth --std=93c --no-formal --workdir="$dir" --out=verilog -gG_PLANE_COLS=16 -gG_PLANE_ROWS=16 \
+        -gG_IMG_COLS=40 -gG_IMG_ROWS=40 -gG_PLANES=5 arbiter > "$dir/raw.v"
+  } > "$dir/ghdl.log" 2>&1 || { echo "GHDL failed: $dir/ghdl.log"; return; }
+  { echo "read_verilog $dir/raw.v"; cat tb/formal/crossings.ys; } > "$dir/proof.ys"
+  if yosys -q -l "$dir/yosys.log" "$dir/proof.ys" > "$dir/messages.log" 2>&1; then
+    echo proved
+  elif grep -q 'ERROR: Assertion failed' "$dir/messages.log"; then
+    if [ -n "${VERBOSE:-}" ]; then cat "$dir/messages.log" >&2; fi
+    echo found
+  else
+    echo "Yosys failed: $dir/messages.log"
+  fi
+}
+
+# All crossings of the arbiter pass through synchronisers, memories or the list of tb/formal/crossings.ys.
+mapfile -t arbiter_files < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d; s|^|rtl/|; /arbiter/q' rtl/files.f)
+proof crossings check_crossings '' '' "${arbiter_files[*]}" \
+  rtl/arbiter.vhd 'collisions past the synchroniser' \
+  's/collision_last <= collision_seen\(1\)/collision_last <= collisions(0)/' \
+  rtl/mac_tx.vhd 'requests past the synchroniser' 's/synchronised\(4 downto 3\)/f_request/' \
+  rtl/arbiter.vhd 'a gate before a synchroniser' 's/full_duplex => duplex_q/full_duplex => full_duplex/' \
+  rtl/arbiter.vhd 'reset of another clock' 's/rst +=> tx_rst/rst => rst/'
 
 if [ $used -ne ${#wanted[@]} ] && [ ${#wanted[@]} -gt 0 ]; then
   echo "formal: unknown name among: ${wanted[*]}"
