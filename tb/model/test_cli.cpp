@@ -732,8 +732,8 @@ TEST_CASE("a killed host: the next one waits for its session to end", "[cli][net
   const TemporaryDir dir;
   write_wall(dir, 10);
   UdpChip chip(wall_chip());
-  chip.sweep_seconds = 0.5;
-  const int killed = std::system(("cd '" + dir.path().string() + "' && timeout -s KILL 0.4 '" PSWEEP_BINARY "' " +
+  chip.sweep_seconds = 5;
+  const int killed = std::system(("cd '" + dir.path().string() + "' && timeout -s KILL 1.5 '" PSWEEP_BINARY "' " +
                                   kInput + "-q -o killed --engine " + chip.url() + " 2>.stderr")
                                      .c_str());
   CHECK(killed != 0);
@@ -741,4 +741,7 @@ TEST_CASE("a killed host: the next one waits for its session to end", "[cli][net
   const Outcome o = psweep_run(dir, kInput + std::string("-q -o out --engine ") + chip.url());
   INFO(o.err);
   CHECK(o.code == 0);
+  const auto counters = nlohmann::json::parse(psweep_run(dir, "info --json " + chip.url()).out)["counters"];
+  CHECK(counters["sessions"] == 2);
+  CHECK(counters["timeouts"] == 1);
 }
