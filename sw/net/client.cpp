@@ -163,7 +163,8 @@ uint64_t Client::send(Type type, uint16_t tile, uint16_t index, const Bytes& pay
 }
 
 std::optional<Event> Client::receive(double timeout_s) {
-  const double until = now() + std::max(0.0, timeout_s);
+  // A remainder shorter than the clock's step would let no time pass at all.
+  const double until = now() + (timeout_s > 0 ? std::max(timeout_s, 1e-5) : 0);
   for (;;) {
     const auto packet = transport_.receive(std::max(0.0, until - now()));
     if (!packet) return std::nullopt;

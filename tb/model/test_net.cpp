@@ -211,6 +211,41 @@ TEST_CASE("40 % of all packets lost", "[net]") {
   CHECK(t.statistics.resent > 0);
 }
 
+TEST_CASE("the link is kept full, and so is the engine", "[net]") {
+  const net::ArbiterConfig c;  // the 256x130 tile at 166 MHz
+  golden::Arbiter chip(c);
+  chip.set_compute([](const golden::TileJob& t, const auto&, const auto&, const auto&) {
+    return golden::TileResult{std::vector<golden::MapCell>(golden::unload_clocks(t), {0, 0, 0, 1}), 0};
+  });
+  golden::TileJob job;
+  job.tile_cols = 256, job.tile_rows = 130, job.win_cols = 340, job.win_rows = 144, job.planes = 1;
+  const net::LinkTile tile{job, golden::Pixels(340, 144), golden::Pixels(340, 144)};
+  const int count = 20, in_flight = GENERATE(1, 2);
+  const double sweep = GENERATE(0.0, 0.07);  // the second: 301 planes take longer
+  CAPTURE(in_flight, sweep);
+  chip.set_sweep_time(sweep);
+  SimulatedLink link(chip, {}, 1);
+  net::Client client(link, 10, 1);
+  net::LinkOptions options;
+  options.in_flight = in_flight;
+  int received = 0;
+  const net::LinkFigures f = net::run_link_tiles(
+      client, client.info(), {golden::PlaneEntry{}}, count, options, [&](int) { return tile; },
+      [&](int, const std::vector<golden::MapCell>& cells) { received += cells.size() == 256 * 130; }, [](uint64_t) {});
+  CHECK(received == count);
+  CHECK(client.statistics().resent == 0);
+  CHECK(client.statistics().lost == 0);
+  CHECK(f.cell_bytes == uint64_t{count} * 256 * 130 * 4);
+  const double down = 8e-6 * static_cast<double>(f.cell_bytes) / f.seconds;
+  // Of the time from the first launch to the last map, without the first upload and the last download.
+  const double load = 340 * 144 / 166e6, work = count * (load + sweep);
+  const double busy = work / (f.seconds - 0.0083 - 0.0114);
+  CAPTURE(down, busy, f.seconds);
+  if (in_flight == 2 && sweep == 0) CHECK(down > 85);
+  if (in_flight == 2 && sweep > 0) CHECK(busy > 0.99);
+  if (in_flight == 1) CHECK(down < 60);
+}
+
 TEST_CASE("a pulled cable: the transfer goes on", "[net]") {
   const Scene scene(small_chip());
   golden::Arbiter chip(small_chip());
