@@ -39,6 +39,12 @@ demo-full: setup ## The same at 1120x1120 with 301 planes, every tile through th
 sim: build ## The regression, RTL bit-exact with the model   T=<regex of test names> SEED=n
 	@scripts/sim.sh
 
+.PHONY: sim-net
+sim-net: setup ## The simulated chip behind the kernel's network stack: ping, a whole pair over UDP, byte for byte
+	@scripts/setup.sh net
+	@scripts/build.sh psweep psweep-sim
+	@scripts/sim_net.sh
+
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
 	@scripts/build.sh psweep
@@ -73,6 +79,11 @@ format: ## Lay out the C++ with clang-format
 .PHONY: fresh-machine
 fresh-machine: ## README's commands in a bare Debian root   SUITE=bookworm|trixie (root only)
 	@scripts/fresh_machine.sh $(or $(SUITE),bookworm)
+
+.PHONY: mac-opinion
+mac-opinion: ## The MAC against the MII models of cocotbext-eth in Icarus (fetches both Python packages once)
+	@scripts/setup.sh build opinion
+	@scripts/mac_opinion.sh
 
 .PHONY: clean
 clean: ## Remove build/

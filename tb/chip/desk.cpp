@@ -36,6 +36,7 @@ Desk::Desk(std::unique_ptr<ChipModel> chip, const DeskSettings& settings)
       next_clk_(part_of(clk_period_, settings.clk_phase)),
       next_rx_(part_of(rx_period_, settings.rx_phase)),
       next_tx_(part_of(tx_period_, settings.tx_phase)) {
+  if (!(settings.clk_mhz >= 30)) throw InputError("clk: the chip needs 30 MHz or more");
   link_.on_begin = [this](bool from_chip) { frame_begins(from_chip); };
   link_.on_end = [this](bool from_chip, bool good, const net::Bytes& frame) { frame_ends(from_chip, good, frame); };
   chip_->set_pins({!settings.half_duplex, settings.speed_100, settings.straps});
@@ -45,8 +46,10 @@ Desk::Desk(std::unique_ptr<ChipModel> chip, const DeskSettings& settings)
 
 void Desk::reset_chip(Time duration) {
   chip_->set_reset(true);
+  in_reset_ = true;
   run_for(std::max(duration, 10 * std::max(rx_period_, clk_period_)));
   chip_->set_reset(false);
+  in_reset_ = false;
   // Released in step with each clock, and memories that clear themselves have had their time.
   run_for(std::max(10 * rx_period_, 2000 * clk_period_));
 }
@@ -109,7 +112,9 @@ void Desk::rx_edge() {
 
 void Desk::tx_edge() {
   next_tx_ += tx_period_;
-  link_.tx_clock(chip_->tx_edge(now_));
+  const MiiSample from_chip = chip_->tx_edge(now_);
+  // A PHY is reset together with the chip, whose outputs say nothing until then.
+  link_.tx_clock(in_reset_ ? MiiSample{} : from_chip);
 }
 
 void Desk::frame_begins(bool from_chip) {

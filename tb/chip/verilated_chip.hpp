@@ -65,8 +65,8 @@ class VerilatedChip : public ChipModel {
       dut_->mii_tx_clk = 0;
       evaluate(at - period / 2);
       // What the edge will take.
-      busy_clocks_ += dut_->led_busy;
-      if (dut_->dbg_cfg_tvalid && dut_->dbg_cfg_tdata >> 32 == golden::kRegCommand &&
+      busy_clocks_ += dut_->led_busy && dut_->arst_n;
+      if (dut_->dbg_cfg_tvalid && dut_->arst_n && dut_->dbg_cfg_tdata >> 32 == golden::kRegCommand &&
           (dut_->dbg_cfg_tdata & golden::kCommandStart) != 0)
         ++launches_;
       dut_->clk = 1;

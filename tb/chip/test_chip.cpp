@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole chip from the pins on, over the in-process link, in simulated time: ARP, ping, capabilities, whole tiled
+// pairs by the host library, cell by cell equal to the model, without and with faults, in half duplex, at several
+// clocks, with the smallest buffers; cable pulled, chip reset, a second host, a host that falls silent; recordings.
+#include <filesystem>
+#include <set>
+
+#include "chip/chip_transport.hpp"
+#include "core/error.hpp"
+#include "engine/stimulus.hpp"
+#include "golden/psweep.hpp"
+#include "net/link_engine.hpp"
+#include "plan/planner.hpp"
+#include "rtl/registers.hpp"
+#include "scene/scene.hpp"
+#include "support/catch.hpp"
+#include "support/scoreboard.hpp"
+#include "support/temporary_dir.hpp"
+
+using namespace psweep;
+using namespace psweep::chip;
+using namespace psweep::tb;
+
+namespace {
+
+const net::Address kHost{{0x02, 0x00, 0x00, 0x00, 0x00, 0x01}, 0x0a050001, 40000};
+const net::Address kOther{{0x02, 0x00, 0x00, 0x00, 0x00, 0x02}, 0x0a050003, 40001};
+
+DeskSettings settings_for(const Chip& chip) {
+  DeskSettings s;
+  s.clk_mhz = chip.config.clk_khz / 1000.0;
+  s.seed = test_seed();
+  return s;
+}
+
+// Does things at given simulated times, while the client waits.
+class Eventful : public ChipTransport {
+ public:
+  using ChipTransport::ChipTransport;
+  std::vector<std::pair<Time, std::function<void(Desk&)>>> events;  // ascending
+  Desk* desk = nullptr;
+
+  std::optional<net::Bytes> receive(double timeout_s) override {
+    const Time end = desk->now() + static_cast<Time>(timeout_s * kSecond);
+    for (;;) {
+      while (!events.empty() && events.front().first <= desk->now()) {
+        events.front().second(*desk);
+        events.erase(events.begin());
+      }
+      const Time until = events.empty() ? end : std::min(end, events.front().first);
+      auto packet = ChipTransport::receive(static_cast<double>(std::max<Time>(0, until - desk->now())) / kSecond);
+      if (packet || until == end) return packet;
+    }
+  }
+};
+
+struct Bench {
+  explicit Bench(const Chip& c, const DeskSettings& s)
+      : chip(c), address(strapped(c.address, s.straps)), desk(c.make(), s), transport(station, address) {
+    transport.desk = &desk;
+  }
+  explicit Bench(const Chip& c) : Bench(c, settings_for(c)) {}
+
+  // The pair in tiles over the link; every cell against the model.
+  void run_pair(int size, int planes, int in_flight = 2) {
+    const golden::Config& format = chip.config.engine;
+    const Scene scene = render(SceneKind::kRocky, test_seed(), size, 1);
+    SweepSetup setup{scene.rig, {planes, 1.0, 4.0}, format, threshold_for(format, 0.85)};
+    const TileSize tile = largest_tile(setup);
+    const Plan plan = plan_tiles(setup, tile.cols, tile.rows);
+    const int count = static_cast<int>(plan.tiles.size());
+    REQUIRE(count > 1);
+    auto input = [&](int i) {
+      const PlacedTile& t = plan.tiles[static_cast<size_t>(i)];
+      return net::LinkTile{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                           cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+    };
+    Scoreboard board("cell");
+    std::set<int> done;
+    net::Client client(transport, 2.0, test_seed());
+    const auto capabilities = client.info();
+    net::LinkOptions options;
+    options.in_flight = in_flight;
+    figures = net::run_link_tiles(
+        client, capabilities, plan.table, count, options, input,
+        [&](int i, const std::vector<golden::MapCell>& cells) {
+          done.insert(i);
+          const net::LinkTile in = input(i);
+          const auto model = golden::run_tile(format, in.job, plan.table, in.left, in.right);
+          REQUIRE(cells.size() == model.cells.size());
+          for (size_t at = 0; at < cells.size(); ++at)
+            board.compare(rtl::pack_cell(format, cells[at]), rtl::pack_cell(format, model.cells[at]),
+                          {i, -1, static_cast<int>(at) % in.job.tile_cols, static_cast<int>(at) / in.job.tile_cols},
+                          static_cast<uint64_t>(desk.clocks()));
+        },
+        [](uint64_t) {});
+    statistics = client.statistics();
+    INFO(board.report());
+    CHECK(board.ok());
+    CHECK(static_cast<int>(done.size()) == count);
+    CHECK(desk.link().violations() == 0);
+    tiles = count;
+  }
+
+  const Chip& chip;
+  net::Address address;
+  Desk desk;
+  Station station{desk, kHost, address.ip, address.port};
+  Eventful transport;
+  net::LinkFigures figures;
+  net::LinkStatistics statistics;
+  int tiles = 0;
+};
+
+net::Bytes request(uint8_t type, uint32_t token = 0, const net::Bytes& payload = {}) {
+  net::Header h;
+  h.type = type;
+  h.token = token;
+  h.sequence = 7;
+  net::Bytes b = net::encode(h);
+  for (const uint8_t byte : payload) b.push_back(byte);
+  return b;
+}
+net::Header answer(Station& station, const net::Bytes& message) {
+  REQUIRE(station.send_udp(message));
+  const auto reply = station.receive_udp(10 * kMillisecond);
+  REQUIRE(reply);
+  const auto h = net::decode(*reply);
+  REQUIRE(h);
+  return *h;
+}
+
+}  // namespace
+
+TEST_CASE("chip: ARP, ping of all sizes, addresses by straps, both speeds") {
+  DeskSettings s = settings_for(chip_named("tiny"));
+  const bool fast = GENERATE(true, false);
+  s.speed_100 = fast;
+  s.straps = fast ? 0x00 : 0x9a;
+  Bench b(chip_named("tiny"), s);
+  REQUIRE(b.station.resolve(3));
+  CHECK(*b.station.chip_mac() == b.address.mac);
+  for (size_t size = 0; size <= 1468; size += fast && (size < 40 || size > 1440) ? 1 : fast ? 29 : 367) {
+    INFO("size " << size << (fast ? ", 100" : ", 10") << " Mbit/s");
+    CHECK(b.station.ping(size, 5 * kMillisecond));
+  }
+  CHECK(b.desk.link().violations() == 0);
+  CHECK(b.station.dropped() == 0);
+}
+
+TEST_CASE("chip: capability words say what the configuration's file says") {
+  for (const Chip& chip : chips()) {
+    INFO("configuration " << chip.name);
+    Bench b(chip);
+    net::Client client(b.transport, 1.0, 1);
+    const auto got = client.info();
+    const net::ArbiterConfig& a = chip.config;
+    const golden::Config &e = a.engine, &g = got.config.engine;
+    CHECK(g.img_cols == e.img_cols);
+    CHECK(g.img_rows == e.img_rows);
+    CHECK(g.plane_cols == e.plane_cols);
+    CHECK(g.plane_rows == e.plane_rows);
+    CHECK(g.planes == e.planes);
+    CHECK(g.window == e.window);
+    CHECK(g.pix_bits == e.pix_bits);
+    CHECK(g.weight_bits == e.weight_bits);
+    CHECK(g.interp_frac == e.interp_frac);
+    CHECK(g.mncc_bits == e.mncc_bits);
+    CHECK(g.frac_bits == e.frac_bits);
+    CHECK(g.lanes == e.lanes);
+    CHECK(got.config.clk_khz == a.clk_khz);
+    CHECK(got.config.chunk_bytes == a.chunk_bytes);
+    CHECK(got.config.row_slots == a.slots());
+    CHECK(got.config.rx_slots == a.rx_slots);
+    CHECK(got.config.session_ms == a.session_ms);
+    const int cells = a.map_depth > 0 ? a.map_depth : e.plane_cols * e.plane_rows;
+    CHECK(got.config.map_depth >= cells);
+    CHECK(got.config.map_depth < cells + a.chunk_cells());
+    uint64_t mac = 0;
+    for (const uint8_t byte : b.address.mac) mac = mac << 8 | byte;
+    CHECK(got.mac == mac);
+  }
+}
+
+TEST_CASE("chip: a tiled pair is the model's map, every configuration for tests, one and two tiles in flight") {
+  const char* name = GENERATE("tiny", "tiny_min", "odd");
+  const int in_flight = GENERATE(1, 2);
+  INFO(name << ", in flight " << in_flight);
+  const Chip& chip = chip_named(name);
+  Bench b(chip);
+  b.run_pair(chip.config.engine.plane_cols * 5 / 2, chip.config.engine.planes, in_flight);
+  CHECK(b.desk.chip().launches() == b.tiles);
+}
+
+TEST_CASE("chip: a tiled pair at other clocks and phases") {
+  const double mhz = GENERATE(60.0, 166.0, 300.0);
+  for (const double phase : {0.0, 0.5}) {
+    INFO(mhz << " MHz, phase " << phase);
+    DeskSettings s = settings_for(chip_named("tiny"));
+    s.clk_mhz = mhz;
+    s.clk_phase = phase;
+    s.rx_phase = 0;
+    s.tx_phase = phase;  // 0: edges coincide
+    s.rx_ppm = 100;
+    s.tx_ppm = -100;
+    Bench bench(chip_named("tiny"), s);
+    bench.run_pair(40, 12);
+    CHECK(bench.tiles > 4);
+  }
+}
+
+TEST_CASE("chip: faults of every kind, the identical map") {
+  const double rate = GENERATE(0.01, 0.1);
+  const char* name = GENERATE("tiny", "tiny_min");
+  const int kind = GENERATE(0, 1, 2, 3, 4);
+  static const char* const kinds[] = {"loss", "duplication", "reordering and delay", "corruption", "all of them"};
+  INFO(name << ", " << rate << " " << kinds[kind] << ", seed " << test_seed());
+  DeskSettings s = settings_for(chip_named(name));
+  FaultRates& f = s.faults;
+  if (kind == 0 || kind == 4) f.loss = rate;
+  if (kind == 1 || kind == 4) f.duplicate = rate;
+  if (kind == 2 || kind == 4) f.reorder = f.delay = rate;
+  if (kind == 3 || kind == 4) f.corrupt = f.corrupt_fcs = rate;
+  Bench b(chip_named(name), s);
+  b.run_pair(40, 12);
+  const FaultCounters there = b.desk.faults_to_chip(), back = b.desk.faults_from_chip();
+  const uint64_t happened = there.lost + there.duplicated + there.reordered + there.delayed + there.corrupted +
+                            there.corrupted_fcs + back.lost + back.duplicated + back.reordered + back.delayed +
+                            back.corrupted + back.corrupted_fcs;
+  if (rate > 0.05) CHECK(happened > 0);
+}
+
+TEST_CASE("chip: half duplex, with and without faults") {
+  const int delay = GENERATE(0, 20);
+  const double loss = GENERATE(0.0, 0.01);
+  DeskSettings s = settings_for(chip_named("tiny"));
+  s.half_duplex = true;
+  s.medium_delay = delay;
+  s.faults.loss = loss;
+  INFO("delay " << delay << " nibbles, loss " << loss << ", seed " << s.seed);
+  Bench b(chip_named("tiny"), s);
+  b.run_pair(40, 12);
+  CHECK(b.desk.link().late == 0);
+  if (delay > 0) CHECK(b.desk.link().collisions > 0);
+  net::Client client(b.transport, 1.0, 2);
+  const auto counters = client.counters();
+  CHECK(counters[net::kTxLate] == 0);
+  if (delay > 0) CHECK(counters[net::kTxCollisions] > 0);
+}
+
+TEST_CASE("chip: cable out for a while, in the middle of a pair") {
+  Bench b(chip_named("tiny"));
+  // Shorter than the session's time.
+  b.transport.events = {{2 * kMillisecond, [](Desk& d) { d.set_cable(false); }},
+                        {40 * kMillisecond, [](Desk& d) { d.set_cable(true); }}};
+  b.run_pair(64, 12);
+  CHECK(b.transport.events.empty());
+  CHECK(b.statistics.resent > 0);
+}
+
+TEST_CASE("chip: reset in the middle of a pair") {
+  Bench b(chip_named("tiny"));
+  b.transport.events = {{2 * kMillisecond, [](Desk& d) { d.reset_chip(); }}};
+  b.run_pair(64, 12);
+  CHECK(b.transport.events.empty());
+  CHECK(b.statistics.sessions == 2);
+}
+
+TEST_CASE("chip: another host is told that the chip is busy, and learns its counters all the same") {
+  Bench b(chip_named("tiny"));
+  const net::Header first = answer(b.station, request(net::kOpen, 0, {1, 2, 3, 4}));
+  CHECK(first.flags == net::kOk);
+  CHECK(first.token != 0);
+  {
+    Station other(b.desk, kOther, b.address.ip, b.address.port);
+    CHECK(answer(other, request(net::kOpen, 0, {4, 3, 2, 1})).flags == net::kBusy);
+    CHECK(answer(other, request(net::kStatus, first.token + 1)).flags == net::kBusy);
+    CHECK(answer(other, request(net::kClose, first.token + 1)).flags == net::kBusy);
+    CHECK(answer(other, request(net::kCounters)).flags == net::kOk);
+    CHECK(other.ping(100));
+  }
+  Station again(b.desk, kHost, b.address.ip, b.address.port);
+  CHECK(answer(again, request(net::kStatus, first.token)).flags == net::kOk);
+  CHECK(b.desk.chip().session());
+  CHECK(answer(again, request(net::kClose, first.token)).flags == net::kOk);
+  b.desk.run_for(100 * kMicrosecond);
+  CHECK_FALSE(b.desk.chip().session());
+  CHECK(answer(again, request(net::kStatus, first.token)).flags == net::kNoSession);
+}
+
+TEST_CASE("chip: a session ends when its host falls silent, not before") {
+  const Chip& chip = chip_named("odd");
+  const Time silence = chip.config.session_ms * kMillisecond;
+  Bench b(chip);
+  const net::Header first = answer(b.station, request(net::kOpen, 0, {1, 2, 3, 4}));
+  b.desk.run_for(silence / 2);
+  CHECK(answer(b.station, request(net::kStatus, first.token)).flags == net::kOk);
+  b.desk.run_for(silence - 2 * kMillisecond);
+  CHECK(b.desk.chip().session());
+  b.desk.run_for(4 * kMillisecond);
+  CHECK_FALSE(b.desk.chip().session());
+  CHECK(b.desk.idle());
+}
+
+TEST_CASE("chip: recording of the wire and waves of a tile") {
+  TemporaryDir dir;
+  const auto pcap = dir / "wire.pcap", wave = dir / "tile.fst";
+  const Chip& chip = chip_named("tiny");
+  Bench b(chip);
+  b.desk.record(pcap.string());
+  if (chip.waves) {
+    WaveWindow window;
+    window.file = wave.string();
+    window.tile = 1;
+    window.clocks = 3000;
+    b.desk.watch(window);
+  }
+  b.run_pair(40, 12);
+  b.desk.run_for(kMillisecond);
+  b.desk.finish();
+  CHECK(b.desk.recorded() == b.desk.link().sent + b.desk.link().received);
+  CHECK(std::filesystem::file_size(pcap) > 24 + b.desk.recorded() * 76);
+  if (chip.waves) {
+    CHECK(b.desk.wave_written());
+    CHECK(std::filesystem::file_size(wave) > 1000);
+  }
+}
+
+TEST_CASE("chip: unknown names are refused with the known ones, waves where there are none") {
+  CHECK_THROWS_WITH(chip_named("no_such_chip"), contains("tiny"));
+  for (const Chip& chip : chips()) {
+    if (chip.waves) continue;
+    INFO(chip.name);
+    CHECK_THROWS_AS(chip.make()->open_wave("/dev/null"), WaveError);
+  }
+  DeskSettings slow = settings_for(chip_named("tiny"));
+  slow.clk_mhz = 29;
+  CHECK_THROWS_AS(Desk(chip_named("tiny").make(), slow), InputError);
+}
