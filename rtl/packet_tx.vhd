@@ -110,7 +110,7 @@ architecture rtl of packet_tx is
   signal way_place    : unsigned(5 downto 0);
   signal way_peer     : std_logic;
   signal way_checksum : std_logic;
-  signal way_no_zero  : std_logic; -- a checksum that must not be zero
+  signal way_no_zero  : std_logic; -- a checksum that may have another zero
   signal way_byte     : std_logic_vector(7 downto 0);
   signal way_add      : std_logic;
   signal way_clear    : std_logic;
@@ -309,7 +309,7 @@ begin
       way_we       <= walking and not rst and (to_bit(round = 0) or at_checksum);
       way_place    <= place;
       way_checksum <= at_checksum;
-      way_no_zero  <= udp and not round(1);
+      way_no_zero  <= not round(1);
       way_clear    <= to_bit(round = 2 and place = 0);
       if round = 0 then
         way_add <= udp and to_bit(place >= 14 and place <= 39);
@@ -336,8 +336,8 @@ begin
     end if;
   end process p_way;
 
-  -- Round 1 and 3 begin with zeros, so that no carry is left when the checksum is written. 40 and 41 are written in
-  -- round 0, too, as 0xffff: what UDP has in place of zero.
+  -- Round 1 and 3 begin with zeros, so that no carry is left when the checksum is written. Where it would be zero in
+  -- round 1 the fixed byte stays: 0xffff for UDP, zero for ICMP.
   data <= p_data when paying = '1' else
           peer_byte when way_peer = '1' and way_checksum = '0' else
           way_byte when way_checksum = '0' or (way_no_zero = '1' and sum = x"ffff") else
