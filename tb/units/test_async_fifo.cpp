@@ -230,6 +230,33 @@ TEMPLATE_TEST_CASE("async_fifo: resets of one side or both, in any order, while 
   CHECK(total_lost > 0);  // else no reset ever found a word
 }
 
+TEMPLATE_TEST_CASE("async_fifo: a reset of one side alone empties it", "", Shape9x4, Shape12x16, Shape1x64) {
+  std::mt19937 random(test_seed() + 3);
+  for (int round = 0; round < 20; ++round) {
+    Bench<TestType> bench(static_cast<uint32_t>(random()), random_timing(random), 0, 1.0);
+    bench.push(TestType::kDepth);
+    bench.clocks.run_until([&] { return bench.driver.done(); });
+    bench.settle();
+    REQUIRE(bench.dut.r_valid == 1);
+    const bool writer = round % 2 != 0;
+    CData& pin = writer ? bench.dut.w_rst : bench.dut.r_rst;
+    bench.monitor.set_watching(false);
+    pin = 1;
+    bench.clocks.run(writer ? bench.w : bench.r, 1);
+    pin = 0;
+    bench.settle();
+    CHECK(bench.dut.r_valid == 0);
+    CHECK(bench.dut.w_ready == 1);
+    bench.board.forget_expectations();
+    bench.push(TestType::kDepth);
+    bench.monitor.set_stall(0);
+    bench.clocks.run_until([&] { return bench.board.outstanding() == 0; });
+    bench.settle();
+    INFO(bench.board.report());
+    REQUIRE(bench.board.ok());
+  }
+}
+
 TEST_CASE("async_fifo: a reset waits for a clock that stands still") {
   Bench<Shape9x4> bench(test_seed(), {40000, 8000, 0, 300, 0}, 0, 0);
   bench.w.set_running(false);
