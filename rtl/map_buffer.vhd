@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- map_buffer: the map of one tile, written as the engine unloads it, read in chunks as bytes (docs/protocol.md, 'Data').
+-- map_buffer: the map of one tile, written as the engine unloads it, read in chunks as bytes (docs/protocol.md,
+--             'Data').
 --   Whole    : G_DEPTH >= G_CELLS: cell n at word n, always room. keep means nothing
 --   Ring     : G_DEPTH < G_CELLS, a multiple of G_CHUNK_CELLS: cell n at word n mod G_DEPTH. A chunk is begun when all
 --              chunks that lie G_DEPTH cells or more before it are below keep. keep belongs to the map inside: 0 in

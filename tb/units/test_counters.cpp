@@ -76,7 +76,8 @@ class Bench : public Agent {
       const uint32_t all = model.value(n);
       const uint64_t old = now - std::min(now, steady_ + 2 * model.spacing());
       uint32_t recent = 0;
-      for (const uint64_t p : pulses_[static_cast<size_t>(n)]) recent += p >= old;
+      const auto& pulses = pulses_[static_cast<size_t>(n)];
+      for (auto p = pulses.rbegin(); p != pulses.rend() && *p >= old; ++p) ++recent;
       const Place place{-1, n, 0, 0};
       const uint32_t value = dut.r_data;
       board.compare(value + recent >= all && value <= all ? all : value, all, place, now);
