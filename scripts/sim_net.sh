@@ -10,7 +10,7 @@
 #     --psweep, --sim    the programs (default: build/psweep, build/psweep-sim)
 #     --out              where to write (default: build/sim-net)
 #     --config           the chip (default: tiny), with the planes and window it serves (default: 12, 5)
-#     --size             side of the images (default: 96; with --small: 48)
+#     --size             side of the images (default: 96; with --small: 64)
 #
 # Needs /dev/net/tun and the right to make namespaces: root, or user namespaces and a /dev/net/tun open to users.
 # Without them it prints 'SKIPPED: <reason>', tests the chip over the in-process link instead, and ends with 0 if that
@@ -37,7 +37,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-if [ -z "$size" ]; then if [ $small = 1 ]; then size=48; else size=96; fi; fi
+if [ -z "$size" ]; then if [ $small = 1 ]; then size=64; else size=96; fi; fi
 for program in "$psweep" "$sim"; do
   [ -x "$program" ] || { echo "sim_net.sh: $program is missing; run make build first" >&2; exit 2; }
 done

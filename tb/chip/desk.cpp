@@ -162,7 +162,11 @@ void Desk::finish() {
   if (wave_open_) chip_->close_wave();
   wave_done_ = wave_done_ || wave_open_;
   wave_open_ = false;
-  if (pcap_) pcap_->close();
+  if (!pcap_) return;
+  pcap_->close();
+  frames_recorded_ = pcap_->frames();
+  pcap_.reset();
+  recorded_.clear();
 }
 
 }  // namespace psweep::chip

@@ -84,10 +84,10 @@ class Desk {
 
   // Frames that were whole at the chip's pins, in the order they began, stamped with that time.
   void record(const std::string& pcap_file) { pcap_ = std::make_unique<PcapWriter>(pcap_file); }
-  uint64_t recorded() const { return pcap_ ? pcap_->frames() : 0; }
+  uint64_t recorded() const { return pcap_ ? pcap_->frames() : frames_recorded_; }
   void watch(const WaveWindow& window) { wave_ = window; }
   bool wave_written() const { return wave_done_; }
-  // Closes pcap and wave; throws if one could not be written.
+  // Ends recording and waves, not the simulation; throws if one could not be written.
   void finish();
 
  private:
@@ -119,6 +119,7 @@ class Desk {
 
   std::unique_ptr<PcapWriter> pcap_;
   std::deque<Recorded> recorded_;
+  uint64_t frames_recorded_ = 0;
   int64_t frames_begun_ = 0;
   std::optional<WaveWindow> wave_;
   bool wave_open_ = false, wave_done_ = false;
