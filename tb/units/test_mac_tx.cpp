@@ -296,6 +296,18 @@ TEST_CASE("mac_tx: duplex, crs and col that change at any time never stop it, an
     CHECK(bench.bursts[i].begin - bench.bursts[i - 1].end() >= kGapNibbles);
 }
 
+TEST_CASE("mac_tx: the preamble reads the source address, which stirs the random numbers") {
+  Bench bench(test_seed(), false);
+  std::map<unsigned, int> seen;
+  bench.pins = [&](Bench& b) {
+    if (b.sending() && b.nibble() < 13) ++seen[b.dut.r_addr];
+  };
+  bench.send({Bytes(60, 0)});
+  CHECK(seen.begin()->first >= 8);
+  CHECK(seen.rbegin()->first == 15);
+  CHECK(seen.size() >= 7);
+}
+
 TEST_CASE("mac_tx: a reset within a frame, jam or backoff; the next frame is right") {
   for (const int clocks : {10, 28, 40, 70, 90, 300}) {
     Bench bench(test_seed(), false);
