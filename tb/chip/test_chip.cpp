@@ -252,7 +252,7 @@ TEST_CASE("chip: cable out for a while, in the middle of a pair") {
   Bench b(chip_named("tiny"));
   // Shorter than the session's time.
   b.transport.events = {{2 * kMillisecond, [](Desk& d) { d.set_cable(false); }},
-                        {40 * kMillisecond, [](Desk& d) { d.set_cable(true); }}};
+                        {15 * kMillisecond, [](Desk& d) { d.set_cable(true); }}};
   b.run_pair(64, 12);
   CHECK(b.transport.events.empty());
   CHECK(b.statistics.resent > 0);
