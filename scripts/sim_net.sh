@@ -134,7 +134,8 @@ if command -v tshark > /dev/null; then
       -o udp.check_checksum:TRUE "$@" 2> "$out/tshark.log" || { cat "$out/tshark.log"; return 1; }
   }
   frames=$(read_wire | wc -l)
-  bad=$(read_wire -Y '_ws.malformed || ip.checksum.status == 0 || udp.checksum.status == 0 || icmp.checksum.status == 0' |
+  wrong='_ws.malformed || ip.checksum.status == 0 || udp.checksum.status == 0 || icmp.checksum.status == 0'
+  bad=$(read_wire -Y "$wrong" |
     tee "$out/bad.txt" | wc -l)
   echo "== tshark: $frames frames, $bad of them malformed or with a wrong checksum"
   if [ "$frames" -lt 20 ] || [ "$bad" -ne 0 ]; then head "$out/bad.txt"; exit 1; fi

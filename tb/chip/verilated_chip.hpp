@@ -9,6 +9,7 @@
 #if VM_TRACE
 #include <verilated_fst_c.h>
 #endif
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -113,13 +114,17 @@ class VerilatedChip : public ChipModel {
   void evaluate([[maybe_unused]] Time at) {
     dut_->eval();
 #if VM_TRACE
-    if (trace_) trace_->dump(static_cast<uint64_t>(at / 1000));
+    if (!trace_) return;
+    // The middle of a period of clk may lie before an MII edge that was simulated already.
+    dumped_ = std::max(at / 1000, dumped_ + 1);
+    trace_->dump(static_cast<uint64_t>(dumped_));
 #endif
   }
   VerilatedContext context_;
   std::unique_ptr<Dut> dut_;
 #if VM_TRACE
   std::unique_ptr<VerilatedFstC> trace_;
+  int64_t dumped_ = -1;  // picoseconds
 #endif
   int64_t launches_ = 0, busy_clocks_ = 0;
 };
