@@ -171,7 +171,7 @@ bool self_test(Desk& desk, const net::Address& chip) {
   bool good = *station.chip_mac() == chip.mac;
   for (const size_t size : {size_t{0}, size_t{56}, size_t{1000}, size_t{1468}}) {
     std::optional<Time> time;
-    for (int attempt = 0; attempt < 10 && !time; ++attempt) time = station.ping(size);
+    for (int attempt = 0; attempt < 10 && !time; ++attempt) time = station.ping(size, 5 * kMillisecond);
     if (time) {
       std::printf("ping, %zu bytes: %.1f us\n", size + 4, static_cast<double>(*time) / kMicrosecond);
     } else {
