@@ -22,11 +22,11 @@ net::LinkTile random_tile(const golden::Config& e, std::mt19937& random) {
   net::LinkTile t;
   t.job.tile_cols = std::min(e.plane_cols, e.img_cols - e.window - 2);
   t.job.tile_rows = std::min(e.plane_rows, e.img_rows - e.window);
-  t.job.win_cols = t.job.tile_cols + e.window + 1;
-  t.job.win_rows = t.job.tile_rows + e.window - 1;
+  t.job.win_cols = t.job.tile_cols + e.window + 2;  // samples, two pixels of shift, a neighbour
+  t.job.win_rows = t.job.tile_rows + e.window;
   t.job.planes = 3;
   t.job.threshold = (1 << e.mncc_bits) / 2;
-  t.job.left = t.job.right = {0, t.job.win_cols - 1, 0, t.job.win_rows - 1};
+  t.job.left = t.job.right = {0, t.job.win_cols - 2, 0, t.job.win_rows - 2};
   t.left = t.right = golden::Pixels(t.job.win_cols, t.job.win_rows);
   for (size_t i = 0; i < t.left.data.size(); ++i) {
     t.right.data[i] = static_cast<uint16_t>(random() & ((1u << e.pix_bits) - 1));
@@ -81,7 +81,8 @@ void run(const Chip& chip, const std::string& file) {
   client.open(capabilities);
   client.request(net::kRelease, 7);
   client.request(net::kTable, 9, 3, net::Bytes(8, 0x55));
-  client.request(net::kWrite, 5, 0, net::Bytes(10, 1));
+  client.send(net::kWrite, 5, 0, net::Bytes(10, 1), net::kFlagAnswer);
+  client.receive(1e-3);
   net::write_table(client, chip.config, table);
   net::LinkTile tile = random_tile(chip.config.engine, random);
   tile.job.win_cols = 4095;
