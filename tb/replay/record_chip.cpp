@@ -47,12 +47,12 @@ std::vector<golden::PlaneEntry> shifts() {
 void run(const Chip& chip, const std::string& file) {
   std::mt19937 random(1);
   DeskSettings settings;
-  settings.clk_mhz = 61.3;  // no multiple of 25
+  settings.clk_mhz = 30.7;  // near the lowest, so that few clocks have to be replayed
   Desk desk(std::make_unique<Recorder>(chip.make(), file), settings);
   const net::Address own{{2, 0, 0, 0, 0, 9}, chip.address.ip ^ 3, 4000};
   Station station(desk, own, chip.address.ip, chip.address.port);
   if (!station.resolve()) throw net::LinkError("no answer to ARP");
-  for (const size_t size : {0, 1, 57, 300}) {
+  for (const size_t size : {0, 57}) {
     if (!station.ping(size)) throw net::LinkError("no answer to ping");
   }
   // Frames that must not be obeyed.
@@ -89,7 +89,7 @@ void run(const Chip& chip, const std::string& file) {
   client.request(net::kStart, 0, 0, net::start_payload(chip.config, tile.job, 1));
   client.request(net::kStatus);
   client.request(net::kSet, 0, 0, {0, 0, 0, net::kDuplexHalf});
-  for (const size_t size : {40, 100}) station.ping(size);
+  for (const size_t size : {40}) station.ping(size);
   client.close();
   client.counters();
   desk.finish();
