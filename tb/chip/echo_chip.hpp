@@ -56,7 +56,7 @@ class EchoChip : public ChipModel {
       const size_t i = at_++;
       const uint8_t byte = i < 16 ? 0x55 : f[(i - 16) / 2];
       out_ = {static_cast<uint8_t>(i == 15 ? 13 : byte >> 4 * (i % 2) & 15), true, false};
-      if (at_ == 16 + 2 * f.size()) {
+      if (at_ == 16 + 2 * f.size() - (damage == Damage::kOddNibble ? 1 : 0)) {
         answers_.pop_front();
         sending_ = false;
       }
@@ -68,7 +68,7 @@ class EchoChip : public ChipModel {
       if (wait_ > 0) --wait_;
       if (!answers_.empty() && gap_ >= 24 && wait_ == 0) {
         sending_ = true;
-        at_ = 0;
+        at_ = damage == Damage::kPreamble ? 1 : 0;
       }
     }
     return shown;
@@ -79,6 +79,10 @@ class EchoChip : public ChipModel {
   int64_t busy_clocks() const override { return 0; }
   void open_wave(const std::string& file) override { throw WaveError(file + ": the stand-in has no waves"); }
   void close_wave() override {}
+
+  // What is wrong with the frames it sends.
+  enum class Damage { kNone, kFcs, kPreamble, kOddNibble, kShort };
+  Damage damage = Damage::kNone;
 
   int64_t clocks() const { return clocks_; }
   int64_t disorder() const { return disorder_; }
@@ -113,6 +117,8 @@ class EchoChip : public ChipModel {
       return;
     }
     net::append_fcs(out);
+    if (damage == Damage::kFcs) out.back() ^= 1;
+    if (damage == Damage::kShort) out.resize(63);
     answers_.push_back(std::move(out));
   }
 

@@ -219,13 +219,35 @@ TEST_CASE("recording: every good frame once, in the order of the wire, simulated
   CHECK(at == p.size());
 }
 
+TEST_CASE("link: wrong frames of the chip are counted and do not get through") {
+  using Damage = EchoChip::Damage;
+  Bench b;
+  REQUIRE(b.station.resolve());
+  const LinkCounters& l = b.desk.link();
+  auto ping_with = [&b](Damage damage) {
+    b.chip->damage = damage;
+    return b.station.ping(100, kMillisecond).has_value();
+  };
+  CHECK_FALSE(ping_with(Damage::kFcs));
+  CHECK(l.fcs == 1);
+  CHECK_FALSE(ping_with(Damage::kPreamble));
+  CHECK_FALSE(ping_with(Damage::kOddNibble));
+  CHECK(l.malformed == 2);
+  CHECK_FALSE(ping_with(Damage::kShort));
+  CHECK(l.short_frames == 1);
+  CHECK(l.violations() == 4);
+  CHECK(ping_with(Damage::kNone));
+}
+
 TEST_CASE("desk: cable out and in again; at rest when nothing is to come") {
   Bench b;
   REQUIRE(b.station.ping(10));
   b.desk.run_for(kMillisecond);
   CHECK(b.desk.idle());
   b.desk.set_cable(false);
+  const uint64_t received = b.chip->good_frames();
   CHECK_FALSE(b.station.ping(10));
+  CHECK(b.chip->good_frames() == received);
   b.desk.set_cable(true);
   CHECK(b.station.ping(10));
   CHECK_FALSE(b.desk.idle());

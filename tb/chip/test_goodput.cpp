@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+// Goodput and latency of the whole chip, in simulated time, between the pins of its MII and a station at the wire's
+// full speed. Goodput counts the pixels and cells that arrived, each once, and nothing else: no header, answer,
+// repetition or gap. The chip is the board's (configuration tile, double buffers, 166 MHz); its tiles are swept over
+// one plane, so that the link is the limit; every cell is compared with the model's.
+// Limits: issue of the arbiter, 90 Mbit/s each way at once in full duplex, 81 Mbit/s for the sum in half duplex.
+#include <algorithm>
+#include <cstdio>
+#include <deque>
+#include <random>
+
+#include "chip/chip_transport.hpp"
+#include "golden/psweep.hpp"
+#include "net/link_engine.hpp"
+#include "support/catch.hpp"
+
+using namespace psweep;
+using namespace psweep::chip;
+
+namespace {
+
+constexpr int kAnswerEvery = 8;  // WRITEs, as the host library does
+const net::Address kHost{{0x02, 0x00, 0x00, 0x00, 0x00, 0x01}, 0x0a050001, 40000};
+
+double mbit(uint64_t bytes, Time time) {
+  return 8e-6 * static_cast<double>(bytes) * kSecond / static_cast<double>(time);
+}
+
+// The window of tile `number`: pixels without any order.
+golden::Pixels pixels(int cols, int rows, uint32_t seed) {
+  golden::Pixels p(cols, rows);
+  std::mt19937 random(seed);
+  for (auto& v : p.data) v = static_cast<uint16_t>(random() & 0xff);
+  return p;
+}
+
+struct Bench {
+  explicit Bench(bool half_duplex)
+      : desk(chip.make(), settings(half_duplex)), client(transport, 1.0, 1), capabilities(client.info()) {
+    const golden::Config& e = config.engine;
+    job.tile_cols = e.plane_cols;
+    job.tile_rows = e.plane_rows;
+    job.win_cols = e.img_cols;
+    job.win_rows = e.img_rows;
+    job.planes = 1;
+    job.left = job.right = {0, job.win_cols - 1, 0, job.win_rows - 1};
+    plane.dx_left = plane.dy_left = plane.dx_right = plane.dy_right = 1u << golden::kPosFrac;
+  }
+  static DeskSettings settings(bool half_duplex) {
+    DeskSettings s;
+    s.half_duplex = half_duplex;
+    return s;
+  }
+  net::LinkTile tile(int number) const {
+    const auto seed = static_cast<uint32_t>(number);
+    return {job, pixels(job.win_cols, job.win_rows, 2 * seed + 1), pixels(job.win_cols, job.win_rows, 2 * seed + 2)};
+  }
+  void compare(int number, const std::vector<golden::MapCell>& cells) const {
+    const net::LinkTile in = tile(number);
+    const auto model = golden::run_tile(config.engine, job, {plane}, in.left, in.right);
+    REQUIRE(cells.size() == model.cells.size());
+    size_t wrong = 0;
+    for (size_t i = 0; i < cells.size(); ++i)
+      wrong += net::pack_wire_cell(config.engine, cells[i]) != net::pack_wire_cell(config.engine, model.cells[i]);
+    INFO("tile " << number);
+    CHECK(wrong == 0);
+  }
+  uint64_t lost() { return client.counters()[net::kRxNoSlot]; }
+
+  const Chip& chip = chip_named("tile");
+  const net::ArbiterConfig& config = chip.config;
+  Desk desk;
+  Station station{desk, kHost, chip.address.ip, chip.address.port};
+  ChipTransport transport{station, chip.address};
+  net::Client client;
+  net::Capabilities capabilities;
+  golden::TileJob job;
+  golden::PlaneEntry plane;
+};
+
+// Asks for the map of tile 0 and sends the rows of tile 1 at the same time.
+struct Both {
+  explicit Both(Bench& bench) : b(bench) {
+    b.client.open(b.capabilities);
+    REQUIRE(net::write_table(b.client, b.config, {b.plane}));
+    send_tile(0);
+    while (!b.client.request(net::kStatus).status->has(net::kFlagMapComplete)) REQUIRE(b.desk.now() < kSecond);
+    repeat(net::kStart, 1, 0, net::start_payload(b.config, b.job, 1));
+    rows = net::row_chunks(b.config, b.tile(1));
+    cells.resize(static_cast<size_t>(b.job.tile_cols) * b.job.tile_rows);
+    there.resize((cells.size() + b.config.chunk_cells() - 1) / b.config.chunk_cells());
+  }
+
+  void repeat(net::Type type, uint16_t tile, uint16_t index, const net::Bytes& payload) {
+    while (b.client.request(type, tile, index, payload, net::kFlagAnswer).code != net::kOk)
+      REQUIRE(b.desk.now() < kSecond);
+  }
+  void send_tile(uint16_t number) {
+    const auto chunks = net::row_chunks(b.config, b.tile(number));
+    repeat(net::kStart, number, 0, net::start_payload(b.config, b.job, 1));
+    for (size_t i = 0; i < chunks.size(); ++i) repeat(net::kWrite, number, static_cast<uint16_t>(i), chunks[i]);
+  }
+
+  // Until all rows of tile 1 are in the chip. Bytes that arrived by then, in either direction.
+  void run(int window) {
+    const Time begin = b.desk.now();
+    std::deque<std::pair<uint64_t, uint16_t>> flying;  // order, chunk
+    std::deque<uint16_t> again;
+    uint16_t next = 0;
+    size_t known = 0, sent = 0;
+    std::vector<bool> stored(rows.size());
+    b.client.send(net::kRead, 0, 0, net::read_payload(static_cast<uint16_t>(there.size()), 0));
+    while (known < rows.size()) {
+      while (flying.size() < static_cast<size_t>(window) && (!again.empty() || next < rows.size())) {
+        uint16_t c = next;
+        if (again.empty()) {
+          ++next;
+        } else {
+          c = again.front();
+          again.pop_front();
+        }
+        const bool flag = ++sent % kAnswerEvery == 0 || (again.empty() && next == rows.size());
+        flying.emplace_back(b.client.send(net::kWrite, 1, c, rows[c], flag ? net::kFlagAnswer : 0), c);
+      }
+      const auto event = b.client.receive(0.02);
+      REQUIRE(event);
+      if (const auto* m = std::get_if<net::MapChunk>(&*event)) {
+        take(*m);
+        continue;
+      }
+      const auto& reply = std::get<net::Reply>(*event);
+      REQUIRE(reply.code == net::kOk);
+      const net::Status& s = *reply.status;
+      for (uint16_t c = 0; c < rows.size(); ++c) {
+        if (stored[c] || (s.has(net::kFlagRows) && s.row_tile == 1 && !s.chunk(c))) continue;
+        stored[c] = true;
+        ++known;
+      }
+      while (!flying.empty() && flying.front().first <= reply.order) {
+        if (!stored[flying.front().second]) {
+          ++repeated;
+          again.push_back(flying.front().second);
+        }
+        flying.pop_front();
+      }
+    }
+    took = b.desk.now() - begin;
+    up = golden::load_clocks(b.job) * b.config.pair_bytes();
+    down = cell_bytes;
+  }
+  void take(const net::MapChunk& m) {
+    REQUIRE(m.index < there.size());
+    if (there[m.index]) return;
+    there[m.index] = true;
+    REQUIRE(net::decode_cells(b.config, b.job, m.cells, static_cast<size_t>(m.index) * b.config.chunk_cells(), cells));
+    cell_bytes += m.cells.size();
+    ++chunks;
+  }
+  // The rest of the map, and the cells against the model.
+  void finish() {
+    while (chunks < there.size()) {
+      const auto event = b.client.receive(0.02);
+      if (!event) {
+        size_t first = 0;
+        while (there[first]) ++first;
+        b.client.send(net::kRead, 0, static_cast<uint16_t>(first),
+                      net::read_payload(static_cast<uint16_t>(there.size() - first), 0));
+        REQUIRE(b.desk.now() < kSecond);
+      } else if (const auto* m = std::get_if<net::MapChunk>(&*event)) {
+        take(*m);
+      }
+    }
+    b.compare(0, cells);
+  }
+
+  Bench& b;
+  std::vector<net::Bytes> rows;
+  std::vector<golden::MapCell> cells;
+  std::vector<bool> there;
+  uint64_t cell_bytes = 0, up = 0, down = 0;
+  size_t chunks = 0, repeated = 0;
+  Time took = 0;
+};
+
+}  // namespace
+
+TEST_CASE("goodput: rows up and map down at once, full duplex, at least 90 Mbit/s each way") {
+  Bench b(false);
+  Both both(b);
+  both.run(32);
+  both.finish();
+  const double up = mbit(both.up, both.took), down = mbit(both.down, both.took);
+  const uint64_t lost = b.lost();
+  std::printf("full duplex: %.2f Mbit/s up, %.2f Mbit/s down at once; %zu chunks repeated, %llu frames without slot\n",
+              up, down, both.repeated, static_cast<unsigned long long>(lost));
+  CHECK(up >= 90);
+  CHECK(down >= 90);
+  CHECK(b.desk.link().violations() == 0);
+}
+
+TEST_CASE("goodput: both directions together, half duplex, at least 81 Mbit/s") {
+  Bench b(true);
+  Both both(b);
+  both.run(32);
+  both.finish();
+  const double up = mbit(both.up, both.took), down = mbit(both.down, both.took);
+  const uint64_t lost = b.lost();
+  std::printf(
+      "half duplex: %.2f Mbit/s up + %.2f Mbit/s down = %.2f; %llu collisions of the station, %zu chunks repeated, "
+      "%llu frames without slot\n",
+      up, down, up + down, static_cast<unsigned long long>(b.desk.link().collisions), both.repeated,
+      static_cast<unsigned long long>(lost));
+  CHECK(up + down >= 81);
+  CHECK(b.desk.link().late == 0);
+  CHECK(b.desk.link().violations() == 0);
+}
+
+TEST_CASE("goodput: the host library with two tiles in flight keeps the link full") {
+  const bool half_duplex = GENERATE(false, true);
+  Bench b(half_duplex);
+  constexpr int kTiles = 3;
+  std::vector<Time> done;
+  const auto figures = net::run_link_tiles(
+      b.client, b.capabilities, {b.plane}, kTiles, {}, [&](int i) { return b.tile(i); },
+      [&](int i, const std::vector<golden::MapCell>& cells) {
+        done.push_back(b.desk.now());
+        b.compare(i, cells);
+      },
+      [](uint64_t) {});
+  REQUIRE(done.size() == kTiles);
+  // From the end of the first map to that of the last: the link's steady state, limited by the map, the larger part.
+  const uint64_t down = figures.cell_bytes / kTiles * (kTiles - 1);
+  const uint64_t up = figures.pixel_bytes / kTiles * (kTiles - 2);
+  const Time took = done.back() - done.front();
+  const double both = mbit(up + down, took);
+  const auto& s = b.client.statistics();
+  std::printf(
+      "host library, %s duplex: map %.2f Mbit/s, rows and map %.2f Mbit/s; %llu lost, %llu resent, %u without "
+      "slot, %llu time-outs\n",
+      half_duplex ? "half" : "full", mbit(down, took), both, static_cast<unsigned long long>(s.lost),
+      static_cast<unsigned long long>(s.resent), figures.counters_after[net::kRxNoSlot],
+      static_cast<unsigned long long>(s.timeouts));
+  if (!half_duplex) CHECK(mbit(down, took) >= 90);
+  if (half_duplex) CHECK(both >= 81);
+}
+
+TEST_CASE("goodput: STATUS is answered within 50 us on a quiet link, within 450 us under full load") {
+  Bench b(false);
+  std::vector<Time> trips;
+  b.client.open(b.capabilities);
+  for (int i = 0; i < 20; ++i) {
+    const Time begin = b.desk.now();
+    b.client.request(net::kStatus);
+    trips.push_back(b.desk.now() - begin);
+    b.desk.run_for((i * 37 % 11) * kMicrosecond);
+  }
+  const auto quiet = *std::max_element(trips.begin(), trips.end());
+  std::printf("STATUS on a quiet link: %.1f .. %.1f us\n",
+              1e-9 * static_cast<double>(*std::min_element(trips.begin(), trips.end())),
+              1e-9 * static_cast<double>(quiet));
+  CHECK(quiet < 50 * kMicrosecond);
+}
