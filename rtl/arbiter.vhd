@@ -35,7 +35,8 @@ entity arbiter is
     G_MAP_DEPTH   : integer := 0; -- cells, rounded up to chunks; 0: the largest tile
     G_RX_SLOTS    : integer := 2; -- 2 or 4
     G_SESSION_MS  : integer := 10000; -- 1 .. 65535
-    G_UDP_PORT    : integer := 20563
+    G_UDP_PORT    : integer := 20563;
+    G_SEED        : integer := 1 -- of the backoff's random numbers, 1 .. 131071; another one for every station
   );
   port (
     clk    : in  std_logic;
@@ -495,6 +496,9 @@ begin
     );
 
   u_mac_tx : entity work.mac_tx
+    generic map (
+      G_SEED => G_SEED
+    )
     port map (
       clk         => tx_clk,
       rst         => tx_rst,

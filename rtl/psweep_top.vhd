@@ -167,7 +167,8 @@ begin
       G_MAP_DEPTH   => G_MAP_DEPTH,
       G_RX_SLOTS    => G_RX_SLOTS,
       G_SESSION_MS  => G_SESSION_MS,
-      G_UDP_PORT    => G_UDP_PORT
+      G_UDP_PORT    => G_UDP_PORT,
+      G_SEED        => G_MAC_LO mod 131071 + 1
     )
     port map (
       clk             => clk,
