@@ -12,7 +12,7 @@ namespace psweep::net {
 namespace {
 
 constexpr int kAnswerEvery = 8;         // WRITEs
-constexpr double kLeastPause = 0.005;   // between two questions that need no hurry
+constexpr double kLeastPause = 0.001;   // between two questions that need no hurry
 constexpr double kMostPause = 0.25;     // well below any silence timer
 constexpr uint32_t kMergeGap = 4;       // map chunks sent again in vain rather than one more round trip
 constexpr int kMostRefusals = 64;       // of one session, beyond what reordering explains
@@ -122,6 +122,7 @@ class Pump {
     const Status s = client_.open(chip_);
     errors_ = s.errors;
     error_count_ = s.error_count;
+    half_duplex_ = !s.has(kFlagFullDuplex);
     refusals_ = nowhere_ = 0;
     first_ = next_ = wanted_;
     upload_ = Upload{};
@@ -138,14 +139,16 @@ class Pump {
   }
 
   // What can be sent now -------------------------------------------------------------------------------------------
+  // A chip with a map packet on the wire has room for two requests more, and loses the third. So the map comes first,
+  // and the next tile is started when RELEASE and READ are answered.
   void act() {
-    if (!start_ && next_ < count_ && (!upload_active_ || !upload_.started || upload_.done()) &&
+    if (!reading_ && wanted_ < count_ && downloads_.count(wanted_) != 0) send_read();
+    if (!start_ && !releasing_ && !read_ && next_ < count_ && (!upload_active_ || !upload_.started || upload_.done()) &&
         client_.now() >= start_after_ && (options_.in_flight > 1 || (wanted_ == next_ && !releasing_))) {
       prepare();
       send_start();
     }
     if (upload_active_ && upload_.started) send_rows();
-    if (!reading_ && wanted_ < count_ && downloads_.count(wanted_) != 0) send_read();
   }
 
   void prepare() {
@@ -161,8 +164,12 @@ class Pump {
 
   void send_start() { start_ = {ask(kStart, upload_.number, 0, start_payload(c_, job_, 1)), client_.now()}; }
 
+  // In half duplex the chip cannot answer while this side sends, and its frames wait for the answer: one burst, one
+  // answer, and the chip's map packets in between.
   void send_rows() {
-    while (upload_.flying.size() < static_cast<size_t>(options_.window)) {
+    if (half_duplex_ && !upload_.flying.empty()) return;
+    const auto window = static_cast<size_t>(half_duplex_ ? std::min(options_.window, kAnswerEvery) : options_.window);
+    while (upload_.flying.size() < window) {
       uint32_t c;
       bool first_time = false;
       if (!upload_.again.empty()) {
@@ -179,7 +186,7 @@ class Pump {
       const bool more = !upload_.again.empty() || (upload_.next < upload_.chunks.size() &&
                                                    upload_.next < row_base_ + static_cast<uint32_t>(c_.row_slots));
       const bool flag =
-          ++writes_ % kAnswerEvery == 0 || !more || upload_.flying.size() + 1 == static_cast<size_t>(options_.window);
+          (++writes_ % kAnswerEvery == 0 && !half_duplex_) || !more || upload_.flying.size() + 1 == window;
       const uint64_t order =
           client_.send(kWrite, upload_.number, static_cast<uint16_t>(c), upload_.rows[c], flag ? kFlagAnswer : 0);
       if (flag) note_asked(order);
@@ -331,6 +338,7 @@ class Pump {
   }
 
   void on_status(const Status& s, uint64_t order) {
+    half_duplex_ = !s.has(kFlagFullDuplex);
     if (upload_active_ && upload_.started && s.row_tile == upload_.number) {
       const bool consumed = !s.has(kFlagRows);
       row_base_ = std::max(row_base_, s.base);
@@ -476,6 +484,7 @@ class Pump {
   int wanted_ = 0, next_ = 0, first_ = 0;
   int wanted_at_open_ = 0, fruitless_ = 0, refusals_ = 0, nowhere_ = 0;
   bool lost_session_ = false;
+  bool half_duplex_ = false;
   unsigned errors_ = 0, error_count_ = 0;  // at OPEN
   uint64_t cells_done_ = 0, cells_in_work_ = 0;
 
