@@ -85,6 +85,11 @@ mac-opinion: ## The MAC against the MII models of cocotbext-eth in Icarus (fetch
 	@scripts/setup.sh build opinion
 	@scripts/mac_opinion.sh
 
+.PHONY: link-speed
+link-speed: setup ## Goodput, latency, busy share of the engine and time of a whole pair, on the simulated chip
+	@scripts/build.sh link_speed test_goodput
+	@scripts/link_speed.sh
+
 .PHONY: clean
 clean: ## Remove build/
 	rm -rf $(BUILD)

@@ -139,6 +139,7 @@ class Client {
   uint32_t token_ = 0, nonce_ = 0;
   std::optional<Capabilities> capabilities_;
   uint16_t sequence_ = 0;
+  size_t least_bytes_ = 0;  // of requests that may be padded
   uint64_t order_ = 0;
   std::vector<Sent> sent_;  // by sequence
   double heard_ = 0, asked_ = 0;

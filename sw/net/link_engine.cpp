@@ -139,10 +139,10 @@ class Pump {
   }
 
   // What can be sent now -------------------------------------------------------------------------------------------
-  // A chip with a map packet on the wire has room for two requests more, and loses the third. So the map comes first,
-  // and the next tile is started when RELEASE and READ are answered.
+  // A chip with a map packet on the wire has room for two requests more, and loses the third. So RELEASE, READ and
+  // START go one after the other, the map first.
   void act() {
-    if (!reading_ && wanted_ < count_ && downloads_.count(wanted_) != 0) send_read();
+    if (!reading_ && !releasing_ && wanted_ < count_ && downloads_.count(wanted_) != 0) send_read();
     if (!start_ && !releasing_ && !read_ && next_ < count_ && (!upload_active_ || !upload_.started || upload_.done()) &&
         client_.now() >= start_after_ && (options_.in_flight > 1 || (wanted_ == next_ && !releasing_))) {
       prepare();
@@ -167,7 +167,7 @@ class Pump {
   // In half duplex the chip cannot answer while this side sends, and its frames wait for the answer: one burst, one
   // answer, and the chip's map packets in between.
   void send_rows() {
-    if (half_duplex_ && !upload_.flying.empty()) return;
+    if (half_duplex_ && (!upload_.flying.empty() || waiting())) return;
     const auto window = static_cast<size_t>(half_duplex_ ? std::min(options_.window, kAnswerEvery) : options_.window);
     while (upload_.flying.size() < window) {
       uint32_t c;
@@ -309,7 +309,8 @@ class Pump {
     } else if (r.code == kNotReady) {
       if (r.order == start_.order) {
         start_ = Pending{};
-        start_after_ = client_.now() + pause();
+        // The shortest round trip: later ones include the rows that waited on this side.
+        start_after_ = client_.now() + std::clamp(2 * client_.statistics().rtt_min, kLeastPause, kMostPause);
       }
     } else if (r.order == start_.order) {
       // The session is not what this side believes: begin afresh.

@@ -20,7 +20,7 @@ struct LinkTile {
 
 struct LinkOptions {
   int in_flight = 2;  // 1: the next tile is sent after the map of this one; 2: as soon as the chip takes it
-  int window = 32;    // chunks of rows under way
+  int window = 16;    // chunks of rows under way; requests that are urgent wait behind them
 };
 
 struct LinkFigures {

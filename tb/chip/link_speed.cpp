@@ -36,7 +36,7 @@ class Watched : public ChipTransport {
       look();
       const Time left = end - desk_.now();
       if (left <= 0) return ChipTransport::receive(0);
-      auto packet = ChipTransport::receive(static_cast<double>(std::min(left, 20 * kMicrosecond)) / kSecond);
+      auto packet = ChipTransport::receive(static_cast<double>(std::min(left, kMicrosecond)) / kSecond);
       if (packet) {
         look();
         return packet;
@@ -44,11 +44,19 @@ class Watched : public ChipTransport {
     }
   }
   Time first_launch = -1, last_busy = -1;
+  int64_t launch_clock = 0, busy_clock = 0;
 
  private:
   void look() {
-    if (first_launch < 0 && desk_.chip().launches() > 0) first_launch = desk_.now();
-    if (desk_.chip().busy_clocks() != busy_) last_busy = desk_.now();
+    // To a microsecond.
+    if (first_launch < 0 && desk_.chip().launches() > 0) {
+      first_launch = desk_.now();
+      launch_clock = desk_.clocks();
+    }
+    if (desk_.chip().busy_clocks() != busy_) {
+      last_busy = desk_.now();
+      busy_clock = desk_.clocks();
+    }
     busy_ = desk_.chip().busy_clocks();
   }
   Desk& desk_;
@@ -89,7 +97,6 @@ bool measure(const SweepSetup& setup, const Scene& scene, const Plan& plan, int 
   const double wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count();
   const Time end = desk.now();
 
-  const Time period = kSecond / (static_cast<Time>(chip.config.clk_khz) * 1000);
   uint64_t useful = 0, whole = 0;
   for (size_t i = 0; i < plan.tiles.size(); ++i) {
     const uint64_t clocks = golden::engine_clocks(setup.format, plan.tiles[i].job);
@@ -97,7 +104,7 @@ bool measure(const SweepSetup& setup, const Scene& scene, const Plan& plan, int 
     whole += clocks;
   }
   const Time elapsed = transport.last_busy - transport.first_launch;
-  const auto elapsed_clocks = static_cast<uint64_t>(elapsed / period);
+  const auto elapsed_clocks = static_cast<uint64_t>(transport.busy_clock - transport.launch_clock);
   const double stall = static_cast<double>(elapsed_clocks - std::min(useful, elapsed_clocks));
   const double stall_per_tile = tiles > 1 ? stall / (tiles - 1) : 0;
   const auto& s = client.statistics();
@@ -123,6 +130,39 @@ bool measure(const SweepSetup& setup, const Scene& scene, const Plan& plan, int 
   return wrong == 0 && static_cast<int>(done.size()) == tiles;
 }
 
+// The whole pair with L lanes: a tile takes its load, a share 1/L of its sweep, and its unload, or as long as the link
+// needs for the rows of the next tile or for the map of the one before, with all headers and gaps.
+void forecast(const SweepSetup& setup, const Plan& plan) {
+  const net::ArbiterConfig& c = chip_named("tile").config;
+  auto link_seconds = [&](uint64_t items, int per, int bytes) {
+    // Ethernet header, FCS, preamble, gap, IP and UDP around the message.
+    constexpr int kAround = 14 + 4 + 8 + 12 + 20 + 8 + static_cast<int>(net::kHeaderBytes);
+    return 8e-8 * static_cast<double>((items + static_cast<uint64_t>(per) - 1) / static_cast<uint64_t>(per)) *
+           (kAround + per * bytes);
+  };
+  for (const int lanes : {1, 2, 4, 8}) {
+    double total = 0, engine = 0, before = 0;
+    for (size_t i = 0; i < plan.tiles.size(); ++i) {
+      const golden::TileJob& t = plan.tiles[i].job;
+      const double clocks =
+          static_cast<double>(golden::load_clocks(t) + golden::unload_clocks(t) + golden::fill_clocks(setup.format)) +
+          static_cast<double>(golden::sweep_clocks(setup.format, t)) / lanes;
+      const double sweep = clocks / (1e3 * c.clk_khz);
+      const double down = link_seconds(golden::unload_clocks(t), c.chunk_cells(), c.cell_bytes());
+      double up = 0;
+      if (i == 0) total += link_seconds(golden::load_clocks(t), c.chunk_pairs(), c.pair_bytes());
+      if (i + 1 < plan.tiles.size())
+        up = link_seconds(golden::load_clocks(plan.tiles[i + 1].job), c.chunk_pairs(), c.pair_bytes());
+      total += std::max({sweep, up, before});
+      engine += sweep;
+      before = down;
+    }
+    total += before;
+    std::printf("forecast, %d lane%s: %.3f s, engine busy %.2f %% of it\n", lanes, lanes == 1 ? " " : "s", total,
+                100 * engine / total);
+  }
+}
+
 int run(int argc, char** argv) {
   const int tiles = argc > 1 ? std::atoi(argv[1]) : 3, only = argc > 2 ? std::atoi(argv[2]) : 0;
   const golden::Config& format = chip_named("tile").config.engine;
@@ -136,6 +176,7 @@ int run(int argc, char** argv) {
   }
   std::printf("%dx%d, %d planes in %zu tiles of up to %dx%d cells; 100 Mbit/s full duplex, %g MHz\n", kSize, kSize,
               kPlanes, plan.tiles.size(), size.cols, size.rows, chip_named("tile").config.clk_khz / 1000.0);
+  forecast(setup, plan);
   bool good = true;
   for (const int in_flight : {1, 2})
     if (only == 0 || only == in_flight) good = measure(setup, scene, plan, tiles, in_flight) && good;
