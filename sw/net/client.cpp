@@ -8,7 +8,7 @@
 namespace psweep::net {
 namespace {
 
-constexpr double kFirstPatience = 0.1;    // before anything was measured
+constexpr double kFirstPatience = 0.03;   // before anything was measured
 constexpr double kLeastPatience = 0.004;  // the host's own scheduling
 constexpr double kMostPatience = 0.5;     // so that a cable put back is noticed soon (or 4 round trips)
 constexpr double kBusyPause = 0.25;       // between two OPEN at a busy chip
