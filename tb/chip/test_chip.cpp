@@ -98,7 +98,7 @@ struct Bench {
     INFO(board.report());
     CHECK(board.ok());
     CHECK(static_cast<int>(done.size()) == count);
-    CHECK(desk.link().violations() == 0);
+    CHECK(desk.link().violations() <= cut_frames);
     tiles = count;
   }
 
@@ -110,6 +110,7 @@ struct Bench {
   net::LinkFigures figures;
   net::LinkStatistics statistics;
   int tiles = 0;
+  uint64_t cut_frames = 0;  // a frame that a reset may cut off is not whole
 };
 
 net::Bytes request(uint8_t type, uint32_t token = 0, const net::Bytes& payload = {}) {
@@ -271,6 +272,7 @@ TEST_CASE("chip: cable out for a while, in the middle of a pair") {
 TEST_CASE("chip: reset in the middle of a pair") {
   Bench b(chip_named("tiny"));
   b.transport.events = {{2 * kMillisecond, [](Desk& d) { d.reset_chip(); }}};
+  b.cut_frames = 1;
   b.run_pair(64, 12);
   CHECK(b.transport.events.empty());
   CHECK(b.statistics.sessions == 2);
