@@ -212,9 +212,9 @@ TEST_CASE("chip: a tiled pair at other clocks and phases") {
 
 namespace {
 
-// 1 and 10 % of `rates` (0 or 1 each), buffers for whole tiles and the smallest ones.
-void pair_with_faults(const FaultRates& rates) {
-  const double rate = GENERATE(0.01, 0.1);
+// 1 % and `more` of `rates` (0 or 1 each), buffers for whole tiles and the smallest ones.
+void pair_with_faults(const FaultRates& rates, double more = 0.1) {
+  const double rate = GENERATE_COPY(0.01, more);
   const char* name = GENERATE("tiny", "tiny_min");
   DeskSettings s = settings_for(chip_named(name));
   INFO(name << ", rate " << rate << ", seed " << s.seed);
@@ -228,7 +228,7 @@ void pair_with_faults(const FaultRates& rates) {
   uint64_t happened = 0;
   for (const FaultCounters& f : {b.desk.faults_to_chip(), b.desk.faults_from_chip()})
     happened += f.lost + f.duplicated + f.reordered + f.delayed + f.corrupted + f.corrupted_fcs;
-  if (rate > 0.05) CHECK(happened > 0);
+  if (rate > 0.02) CHECK(happened > 0);
 }
 
 }  // namespace
@@ -239,7 +239,8 @@ TEST_CASE("chip: frames reordered and late, the identical map") { pair_with_faul
 TEST_CASE("chip: frames corrupted, with wrong and good FCS, the identical map") {
   pair_with_faults({0, 0, 0, 0, 1, 1});
 }
-TEST_CASE("chip: all faults together, the identical map") { pair_with_faults({1, 1, 1, 1, 1, 1}); }
+// Six kinds at 3 % each touch every sixth frame, in both directions.
+TEST_CASE("chip: all faults together, the identical map") { pair_with_faults({1, 1, 1, 1, 1, 1}, 0.03); }
 
 TEST_CASE("chip: half duplex, with and without faults") {
   const int delay = GENERATE(0, 20);
