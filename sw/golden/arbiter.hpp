@@ -223,7 +223,7 @@ class Arbiter {
   }
 
   net::Code table(const Bytes& m, const net::Header& h, size_t body) {
-    if (body < 4 || body % 4 != 0 || body / 4 > static_cast<size_t>(config_.chunk_bytes) / 4) {
+    if (body < 4 || body % 4 != 0 || body / 4 > size_t{364}) {
       ++counters_[net::kBadMessages];
       return net::kBadMessage;
     }
@@ -425,12 +425,14 @@ class Arbiter {
   }
 
   void close() {
-    if (stage_ != Stage::kIdle) tiles_dropped_ = std::min(tiles_dropped_ + 1, 0xffffu);
+    const bool dropped = stage_ != Stage::kIdle;
     forget();
+    tiles_dropped_ = dropped ? 1 : 0;  // abort and clear in one command: the drop counts
     open_ = false;
   }
-  // What st_abort of the RTL does.
+  // What st_abort of the RTL does; the engine's errors and counters are cleared with it.
   void forget() {
+    errors_ = error_count_ = tiles_done_ = tiles_dropped_ = window_errors_ = 0;
     stage_ = Stage::kIdle;
     staged_ = row_busy_ = map_busy_ = map_started_ = failed_ = false;
     map_.clear();
