@@ -132,6 +132,7 @@ class Pump {
     downloads_.clear();
     start_after_ = 0;
     asked_ = answered_ = 0;
+    cells_in_work_ = 0;  // what came of an unfinished tile comes again
     progress_(cells_done_);
     lost_session_ = !write_table(client_, c_, table_);
     session_order_ = client_.order();
