@@ -547,3 +547,101 @@ TEST_CASE("addresses on the command line", "[net]") {
     CHECK_THROWS_AS(net::parse_endpoint("--engine", text), InputError);
   }
 }
+
+TEST_CASE("the client believes an answer only if every field fits", "[net]") {
+  const net::ArbiterConfig c = small_chip();
+  golden::Arbiter chip(c);
+  SimulatedLink link(chip, {}, 1);
+  net::Client client(link, 2, 3);
+  client.open(client.info());
+  // An answer held back: sent by the chip, not yet seen by the client.
+  struct Capture : net::Transport {
+    SimulatedLink& link;
+    Bytes latest;
+    explicit Capture(SimulatedLink& l) : link(l) {}
+    void send(const Bytes& m) override {
+      latest = m;
+      link.send(m);
+    }
+    std::optional<Bytes> receive(double timeout) override { return link.receive(timeout); }
+    double now() override { return link.now(); }
+    std::string peer() const override { return link.peer(); }
+  } capture(link);
+  client.close();
+  net::Client spied(capture, 2, 4);
+  spied.open(spied.info());
+
+  spied.send(net::kRelease, 5, 0);
+  const auto reply = link.receive(1);
+  REQUIRE(reply.has_value());
+  auto refused = [&](size_t at, uint8_t flip) {
+    Bytes m = *reply;
+    m[at] ^= flip;
+    return !spied.take(m).has_value();
+  };
+  for (const size_t at : {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 13, 14, 15}) {  // 10: code, 11: not used
+    INFO("byte " << at);
+    CHECK(refused(at, 0x04));
+  }
+  CHECK(refused(10, 0x20));
+  for (const size_t size : {0ul, 15ul, 16ul, reply->size() - 4, reply->size() + 4, reply->size() - 1}) {
+    INFO("size " << size);
+    Bytes m = *reply;
+    m.resize(size);
+    CHECK_FALSE(spied.take(m).has_value());
+  }
+  CHECK(spied.take(*reply).has_value());
+  CHECK_FALSE(spied.take(*reply).has_value());  // once only
+  CHECK(spied.statistics().duplicates == 1);
+
+  spied.send(net::kRead, 3, 2, net::read_payload(4, 0));  // chunks 2 .. 5 of tile 3
+  net::Header h = *net::decode(capture.latest);
+  h.type = net::kMap;
+  auto believed = [&](const net::Header& header, size_t bytes) {
+    Bytes m = net::encode(header);
+    m.resize(m.size() + bytes, 0);
+    return spied.take(m).has_value();
+  };
+  const size_t full = static_cast<size_t>(c.chunk_cells()) * c.cell_bytes();
+  for (uint16_t index = 0; index < 9; ++index) {
+    INFO("chunk " << index);
+    net::Header map = h;
+    map.index = index;
+    CHECK(believed(map, full) == (index >= 2 && index <= 5));
+  }
+  CHECK(believed(h, c.cell_bytes()));
+  CHECK_FALSE(believed(h, 0));
+  CHECK_FALSE(believed(h, full + c.cell_bytes()));
+  CHECK_FALSE(believed(h, full - 1));
+  net::Header other = h;
+  other.token ^= 1;
+  CHECK_FALSE(believed(other, full));
+  other = h;
+  other.tile ^= 1;
+  CHECK_FALSE(believed(other, full));
+  other = h;
+  other.sequence ^= 0x4000;
+  CHECK_FALSE(believed(other, full));
+}
+
+TEST_CASE("cells that cannot be are not believed", "[net]") {
+  net::ArbiterConfig c = small_chip();  // 1 + 4 + 8 + 13 bits in 4 bytes
+  golden::TileJob job;
+  job.planes = 9;
+  job.threshold = 100;
+  std::vector<golden::MapCell> cells(3);
+  auto one = [&](uint64_t word, size_t first) {
+    const Bytes b = {static_cast<uint8_t>(word >> 24), static_cast<uint8_t>(word >> 16),
+                     static_cast<uint8_t>(word >> 8), static_cast<uint8_t>(word)};
+    return net::decode_cells(c, job, b, first, cells);
+  };
+  golden::MapCell cell;
+  cell.plane = 8, cell.frac = 77, cell.v = 5000;
+  CHECK(one(net::pack_wire_cell(c.engine, cell), 2));
+  CHECK(cells[2] == cell);
+  CHECK_FALSE(one(net::pack_wire_cell(c.engine, cell), 3));
+  cell.plane = 9;
+  CHECK_FALSE(one(net::pack_wire_cell(c.engine, cell), 0));
+  CHECK_FALSE(one(uint64_t{1} << 26, 0));
+  CHECK(cells[0] == golden::MapCell{});
+}
