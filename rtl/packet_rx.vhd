@@ -11,12 +11,14 @@
 --   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP), m_length (ICMP: bytes from frame byte 34 on, UDP: payload,
 --               from byte 42 on; ARP: 0) of the oldest message, until m_done; its frame through r_addr, r_data (1
 --               clock)
---   Slots     : G_SLOTS frames. Bytes are stored as they come, and a frame becomes a message at its verdict only. Its
---               slot must be free at its first byte. Addresses wrap within the slot, whatever the input
+--   Ring      : G_SLOTS * 2 KB in granules of 512 bytes. A frame takes 1 to 3 of them, as many as it needs, FCS
+--               included. Bytes are stored as they come, and a frame becomes a message at its verdict only. Each of its
+--               granules must be free at its first byte; else the frame is lost. What waits is never touched, whatever
+--               the input
 --   Events    : bit n = counter n of docs/protocol.md, one pulse a frame two clocks behind its verdict, a message two
 --               (0 and its kind). Order: the MAC's verdict (8, 5, 4, 3, 2, 1), 6 destination MAC, 9 ethertype or ARP,
 --               10 IP header, 11 fragment, 9 protocol, port or ICMP type, 12 UDP length or checksum, 7 no slot
---   Latency   : m_valid 4 clocks behind the verdict
+--   Latency   : m_valid 3 clocks behind the verdict
 --   Structure : one position counter. It starts at -34, so that it counts the bytes behind the IP header without a
 --               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and
 --               a bit that sticks remembers the class of what differed.
@@ -24,7 +26,11 @@
 --               for the next byte, whichever half that is. One for the IP header; one for ICMP, or for UDP with
 --               addresses, total length and a constant in place of the pseudo header (17 + length = total length - 3).
 --               Both are right when all ones; the bytes behind the end add nothing, but settle the carry. Whatever is
---               past the end of the IP packet must be 4 bytes at least, the FCS: else the length was wrong
+--               past the end of the IP packet must be 4 bytes at least, the FCS: else the length was wrong.
+--               The ring is addressed with the position, too: granule of the frame + its upper two bits, mod
+--               granules. So the first 34 bytes (position -34 .. -1) are the last 34 of the granule before, which no
+--               frame uses for its own end: the next one is taken at frame byte 512, position 478. Pointers are granule
+--               numbers with one bit more; kind, length and next granule of a message are kept under its granule
 --   Reset     : no message, next byte is the first of a frame; RAM and data registers have no reset
 --   Golden    : sw/golden/packet_rx.hpp
 library ieee;
@@ -34,7 +40,7 @@ library ieee;
 
 entity packet_rx is
   generic (
-    G_SLOTS    : integer := 2;    -- 2 or 4
+    G_SLOTS    : integer := 2;    -- 2 or 4: RAM of 2 KB each
     G_UDP_PORT : integer := 20563 -- 1 .. 65535
   );
   port (
@@ -52,7 +58,7 @@ entity packet_rx is
     m_valid  : out std_logic;
     m_kind   : out std_logic_vector(1 downto 0);
     m_length : out std_logic_vector(10 downto 0);
-    m_done   : in  std_logic; -- pulse, only while m_valid: the slot is free
+    m_done   : in  std_logic; -- pulse, only while m_valid: its room is free
     r_addr   : in  std_logic_vector(10 downto 0);
     r_data   : out std_logic_vector(7 downto 0);
 
@@ -62,7 +68,7 @@ end entity packet_rx;
 
 architecture rtl of packet_rx is
 
-  constant C_SLOT_W : integer := clog2(G_SLOTS);
+  constant C_RING_W : integer := clog2(4 * G_SLOTS); -- bits of a granule number
   constant C_HEADER : integer := 34; -- bytes up to the end of the IP header: position 0 is frame byte 34
   constant C_FIRST  : unsigned(10 downto 0) := to_unsigned(2048 - C_HEADER, 11);
   constant C_PORT   : unsigned(15 downto 0) := to_unsigned(G_UDP_PORT mod 65536, 16);
@@ -136,24 +142,30 @@ architecture rtl of packet_rx is
   signal outcome : std_logic_vector(15 downto 0);
   signal commit  : std_logic;
 
-  -- Slots: counters with one bit more than a slot number.
-  signal write_slot : unsigned(C_SLOT_W downto 0);
-  signal read_slot  : unsigned(C_SLOT_W downto 0);
+  -- Ring: granule numbers with one bit more.
+  signal store      : std_logic;                        -- a byte of a frame
+  signal crossing   : std_logic;                        -- it is the first of a granule
+  signal write_head : unsigned(C_RING_W downto 0);      -- of the frame that comes in
+  signal write_tail : unsigned(C_RING_W downto 0);      -- the granule behind what it has so far
+  signal read_head  : unsigned(C_RING_W downto 0);      -- of the oldest message
   signal full       : std_logic;
   signal empty      : std_logic;
-  signal opening    : std_logic; -- the next byte is the first of a frame
-  signal room       : std_logic; -- the frame has a slot
+  signal room       : std_logic;                        -- all bytes of the frame so far had room
   signal room_now   : std_logic;
 
+  signal write_step  : unsigned(C_RING_W - 1 downto 0); -- granule of the position: -1, 0, 1, 2
+  signal read_step   : unsigned(C_RING_W - 1 downto 0);
+  signal write_place : unsigned(C_RING_W - 1 downto 0);
+  signal read_place  : unsigned(C_RING_W - 1 downto 0);
   signal frame_we    : std_logic;
-  signal frame_waddr : std_logic_vector(C_SLOT_W + 10 downto 0);
-  signal frame_raddr : std_logic_vector(C_SLOT_W + 10 downto 0);
+  signal frame_waddr : std_logic_vector(C_RING_W + 8 downto 0);
+  signal frame_raddr : std_logic_vector(C_RING_W + 8 downto 0);
   signal read_pos    : unsigned(10 downto 0);
 
-  signal info_waddr   : std_logic_vector(C_SLOT_W - 1 downto 0);
-  signal info_raddr   : std_logic_vector(C_SLOT_W - 1 downto 0);
-  signal info_write   : std_logic_vector(12 downto 0);
-  signal info_read    : std_logic_vector(12 downto 0);
+  signal info_waddr   : std_logic_vector(C_RING_W - 1 downto 0);
+  signal info_raddr   : std_logic_vector(C_RING_W - 1 downto 0);
+  signal info_write   : std_logic_vector(C_RING_W + 13 downto 0);
+  signal info_read    : std_logic_vector(C_RING_W + 13 downto 0);
   signal reply_length : unsigned(10 downto 0);
 
   -- Frame byte n, as place.
@@ -452,42 +464,54 @@ begin
     end if;
   end process p_events;
 
-  -- Slots -------------------------------------------------------------------------------------------------------------
-  empty    <= to_bit(write_slot = read_slot);
-  full     <= to_bit(write_slot(C_SLOT_W - 1 downto 0) = read_slot(C_SLOT_W - 1 downto 0)) and
-              (write_slot(C_SLOT_W) xor read_slot(C_SLOT_W));
-  room_now <= not full when opening = '1' else
+  -- Ring --------------------------------------------------------------------------------------------------------------
+  store    <= fire and not s_last;
+  crossing <= store and to_bit(pos(8 downto 0) = C_FIRST(8 downto 0));
+  empty    <= to_bit(write_head = read_head);
+  full     <= to_bit(write_tail(C_RING_W - 1 downto 0) = read_head(C_RING_W - 1 downto 0)) and
+              (write_tail(C_RING_W) xor read_head(C_RING_W));
+  room_now <= not full and (near or room) when crossing = '1' else -- near: the first granule
               room;
 
-  p_slots : process (clk)
+  p_ring : process (clk)
   begin
     if rising_edge(clk) then
       room <= room_now;
-      if fire = '1' then
-        opening <= '0';
+      if crossing = '1' then
+        write_tail <= write_tail + 1;
+      end if;
+      if verdict = '1' and outcome(0) = '0' then
+        write_tail <= write_head;
       end if;
       if commit = '1' then
-        write_slot <= write_slot + 1;
+        write_head <= write_tail;
       end if;
       if m_done = '1' then
-        read_slot <= read_slot + 1;
+        read_head <= unsigned(info_read(C_RING_W + 13 downto 13));
       end if;
-      m_valid <= not empty and not m_done; -- info_read follows read_slot by one clock
-      if rst = '1' or verdict = '1' then
-        opening <= '1';
-      end if;
+      m_valid <= not empty and not m_done; -- info_read follows read_head by one clock
       if rst = '1' then
-        write_slot <= (others => '0');
-        read_slot  <= (others => '0');
+        write_head <= (others => '0');
+        write_tail <= (others => '0');
+        read_head  <= (others => '0');
         m_valid    <= '0';
       end if;
     end if;
-  end process p_slots;
+  end process p_ring;
 
-  frame_we    <= fire and not s_last and room_now;
-  frame_waddr <= std_logic_vector(write_slot(C_SLOT_W - 1 downto 0) & pos);
-  read_pos    <= unsigned(r_addr) - C_HEADER;
-  frame_raddr <= std_logic_vector(read_slot(C_SLOT_W - 1 downto 0) & read_pos);
+  -- A frame that is longer than 1569 bytes would come to the granule before its own once more.
+  frame_we <= store and room_now and (near or not header);
+
+  write_step(1 downto 0)            <= pos(10 downto 9);
+  write_step(C_RING_W - 1 downto 2) <= (others => header);
+  write_place                       <= write_head(C_RING_W - 1 downto 0) + write_step;
+  frame_waddr                       <= std_logic_vector(write_place & pos(8 downto 0));
+
+  read_pos                         <= unsigned(r_addr) - C_HEADER;
+  read_step(1 downto 0)            <= read_pos(10 downto 9);
+  read_step(C_RING_W - 1 downto 2) <= (others => read_pos(10) and read_pos(9));
+  read_place                       <= read_head(C_RING_W - 1 downto 0) + read_step;
+  frame_raddr                      <= std_logic_vector(read_place & read_pos(8 downto 0));
 
   u_frames : entity work.ram_sdp
     generic map (
@@ -508,14 +532,14 @@ begin
   reply_length <= length when icmp = '1' else
                   length - 8;
 
-  info_waddr <= std_logic_vector(write_slot(C_SLOT_W - 1 downto 0));
-  info_raddr <= std_logic_vector(read_slot(C_SLOT_W - 1 downto 0));
-  info_write <= (not arp and not icmp) & icmp & std_logic_vector(reply_length);
+  info_waddr <= std_logic_vector(write_head(C_RING_W - 1 downto 0));
+  info_raddr <= std_logic_vector(read_head(C_RING_W - 1 downto 0));
+  info_write <= std_logic_vector(write_tail) & (not arp and not icmp) & icmp & std_logic_vector(reply_length);
 
   u_info : entity work.ram_sdp
     generic map (
-      G_DATA_W  => 13,
-      G_DEPTH   => G_SLOTS,
+      G_DATA_W  => C_RING_W + 14,
+      G_DEPTH   => 4 * G_SLOTS,
       G_LATENCY => 1
     )
     port map (

@@ -14,6 +14,9 @@ namespace psweep::golden {
 
 enum class MessageKind { kArp = 0, kIcmp = 1, kUdp = 2 };
 
+// Frames wait in a ring of such pieces, 4 * G_SLOTS of them.
+constexpr size_t kGranule = 512;
+
 struct Message {
   MessageKind kind{};
   int length = 0;  // ICMP: from frame byte 34 to the end of the IP packet; UDP: payload; ARP: 0
@@ -31,7 +34,8 @@ struct VerdictBit {
 constexpr VerdictBit kVerdictOrder[] = {{5, net::kRxOverflow}, {4, net::kRxError}, {3, net::kRxLong},
                                         {2, net::kRxShort},    {1, net::kRxAlign}, {0, net::kRxFcs}};
 
-// Frame with its FCS, as mac_rx delivers it; own.port is G_UDP_PORT; room: a slot was free at the first byte.
+// Frame with its FCS, as mac_rx delivers it; own.port is G_UDP_PORT; room: at the first byte of each kGranule bytes of
+// the frame, one more granule was free.
 // Exact also for good verdicts on fewer than 64 bytes (which mac_rx never gives), but not on more than 1518.
 class PacketRx {
  public:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // packet_rx: pulses of the counters, messages and stored frames equal the model clock by clock and byte by byte. All
 // lengths of UDP and ICMP, every bit of every header flipped, all faults alone and in pairs, checksums at their
-// corners, full slots, random and mutated frames, garbage of any length; what waits in a slot stays as it is. Frames
+// corners, a full ring, random and mutated frames, garbage of any length; what waits in the ring stays as it is. Frames
 // come from net/frames.hpp, and the outcome of the fault pairs is written down here: neither is the model's opinion.
 #include <algorithm>
 #include <deque>
@@ -23,17 +23,17 @@ using net::Bytes;
 
 namespace {
 
-// Number of slots and G_UDP_PORT of the models.
+// Granules and G_UDP_PORT of the models.
 template <class Dut>
 struct Traits;
 template <>
 struct Traits<Vpacket_rx_2> {
-  static constexpr size_t kSlots = 2;
+  static constexpr size_t kGranules = 8;
   static constexpr uint16_t kPort = 20563;
 };
 template <>
 struct Traits<Vpacket_rx_4> {
-  static constexpr size_t kSlots = 4;
+  static constexpr size_t kGranules = 16;
   static constexpr uint16_t kPort = 0x01fe;
 };
 
@@ -42,6 +42,8 @@ constexpr uint64_t kMessageLatency = 3;  // verdict to m_valid
 
 template <class Dut>
 struct Bench : Agent {
+  static constexpr size_t kGranules = Traits<Dut>::kGranules;
+
   struct Frame {
     Bytes bytes;
     uint8_t verdict;
@@ -53,6 +55,7 @@ struct Bench : Agent {
     Bytes bytes;
     uint64_t clock;  // from which on it is shown, if it is the oldest
     int number;
+    size_t granules;
   };
 
   Sim<Dut> sim{400000000, test_seed()};
@@ -73,7 +76,8 @@ struct Bench : Agent {
   // What must come out.
   std::deque<std::pair<uint64_t, uint16_t>> pulses;
   std::deque<Waiting> waiting;
-  size_t used = 0;
+  size_t used = 0;             // granules of what waits
+  size_t taken = 0;            // granules of the frame on its way
   uint64_t blocked_until = 0;  // m_valid is low in the clock behind m_done
 
   // Reader: each message is read `passes` times, then held.
@@ -169,23 +173,27 @@ struct Bench : Agent {
       if (!active) active = true, pass = 0, reading = 0, hold = static_cast<int>(below(max_hold + 1u));
     }
 
-    // A slot is free from the clock behind m_done on.
+    // Granules are free from the clock behind m_done on.
     const size_t used_now = used;
     if (dut.m_done) {
+      used -= waiting.front().granules;
       waiting.pop_front();
       active = false;
-      --used;
       blocked_until = now + 2;
     }
     if (!dut.s_valid || !dut.s_ready) return;
     Frame& f = queue.front();
     offering = false;
-    if (next == 0) room = used_now < Traits<Dut>::kSlots;
+    if (next == 0) room = true, taken = 0;
+    if (next < f.bytes.size() && next % golden::kGranule == 0) room = room && used_now + ++taken <= kGranules;
     if (next++ < f.bytes.size()) return;
     const golden::Received r = golden::PacketRx(own, f.bytes).receive(f.verdict, room);
     if (f.want != 0) outcomes.compare(r.events, f.want, {f.number}, now);
     pulses.emplace_back(now + kEventLatency, r.events);
-    if (r.message) waiting.push_back({*r.message, f.bytes, now + kMessageLatency, f.number}), ++used;
+    if (r.message) {
+      waiting.push_back({*r.message, f.bytes, now + kMessageLatency, f.number, taken});
+      used += taken;
+    }
     queue.pop_front();
     next = 0;
   }
@@ -457,21 +465,25 @@ TEMPLATE_TEST_CASE("packet_rx: checksums at their corners", "", Vpacket_rx_2, Vp
   bench->check();
 }
 
-TEMPLATE_TEST_CASE("packet_rx: full slots, freed at any time, with a byte in every clock", "", Vpacket_rx_2,
+TEMPLATE_TEST_CASE("packet_rx: a full ring, freed at any time, with a byte in every clock", "", Vpacket_rx_2,
                    Vpacket_rx_4) {
   auto bench = std::make_unique<Bench<TestType>>();
   bench->passes = 2;
   for (int i = 0; i < 3000; ++i) {
     const uint32_t kind = bench->below(4);
-    Bytes f = kind == 0 ? bench->arp() : kind == 1 ? bench->icmp(bench->below(80)) : bench->udp(bench->below(80));
+    const uint32_t about = bench->below(4);  // small frames, any, and lengths around 512 and 1024
+    const uint32_t size = about == 0   ? bench->below(1473)
+                          : about == 1 ? 512 * (1 + bench->below(2)) - 46 - 3 + bench->below(7)
+                                       : bench->below(80);
+    Bytes f = kind == 0 ? bench->arp() : kind == 1 ? bench->icmp(size) : bench->udp(size);
     const bool good = bench->below(8) != 0;
     bench->send(bench->closed(f), good ? 0 : static_cast<uint8_t>(bench->below(64)));
     if (bench->below(16) == 0) bench->send({}, 0x20);
   }
   while (!bench->queue.empty()) {
-    bench->max_hold = static_cast<int>(bench->below(4)) * 150;
+    bench->max_hold = static_cast<int>(bench->below(5)) * 900;
     bench->gaps = bench->below(3) == 0 ? 0.5 : 0;
-    bench->sim.run(500);
+    bench->sim.run(2000);
   }
   bench->finish();
   bench->check();
@@ -479,10 +491,40 @@ TEMPLATE_TEST_CASE("packet_rx: full slots, freed at any time, with a byte in eve
   CHECK(bench->count[net::kRxFrames] > 300);
 }
 
+TEMPLATE_TEST_CASE("packet_rx: what just fits is kept, one granule too few is counted, from every granule on", "",
+                   Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  constexpr size_t kAll = Traits<TestType>::kGranules;
+  auto frame = [&](size_t bytes) { return bench->closed(bench->udp(bytes - 46)); };  // with FCS
+  for (size_t turn = 0; turn < 2 * kAll + 1; ++turn) {                               // wrap around, the extra bit, too
+    for (size_t left = 0; left <= 3; ++left) {
+      for (const size_t size : {64, 511, 512, 513, 1023, 1024, 1025, 1518}) {
+        bench->stopped = true;
+        // Filled with frames of 1 to 3 granules up to `left`, each as long as its granules are.
+        for (size_t used = 0; used < kAll - left;) {
+          const size_t n = std::min<size_t>(1 + bench->below(3), kAll - left - used);
+          bench->send(frame(std::min<size_t>(n * 512, 1518)), 0, kGoodUdp);
+          used += n;
+        }
+        const bool fits = (size + 511) / 512 <= left;
+        bench->send(frame(size), 0, fits ? kGoodUdp : bit(net::kRxNoSlot));
+        bench->send(frame(size), 4, bit(net::kRxShort));  // a fault counts before the room
+        bench->sim.run_until([&] { return bench->queue.empty(); });
+        bench->stopped = false;
+        bench->finish();
+      }
+    }
+    bench->send(frame(64), 0, kGoodUdp);
+    bench->finish();
+  }
+  bench->check();
+  CHECK(bench->count[net::kRxNoSlot] == (2 * kAll + 1) * (8 + 5 + 2));
+}
+
 TEMPLATE_TEST_CASE("packet_rx: garbage of any length never touches a waiting message", "", Vpacket_rx_2, Vpacket_rx_4) {
   auto bench = std::make_unique<Bench<TestType>>();
-  constexpr size_t kSlots = Traits<TestType>::kSlots;
-  for (size_t filled = 1; filled <= kSlots; ++filled) {
+  constexpr size_t kLargest = Traits<TestType>::kGranules / 3;
+  for (size_t filled = 1; filled <= kLargest; ++filled) {
     bench->stopped = true;
     for (size_t i = 0; i < filled; ++i) bench->send(bench->closed(bench->udp(1472 - i)), 0, kGoodUdp);
     for (const size_t size : {0, 1, 5, 13, 33, 34, 41, 63, 1518, 1519, 1570, 2014, 2047, 2048, 2049, 4100, 9000}) {
@@ -549,7 +591,7 @@ TEMPLATE_TEST_CASE("packet_rx: random and mutated frames", "", Vpacket_rx_2, Vpa
     bench->send(f, verdict);
   }
   while (!bench->queue.empty()) {
-    bench->max_hold = bench->below(3) == 0 ? 3000 : 0;
+    bench->max_hold = bench->below(3) == 0 ? 12000 : 0;
     bench->gaps = bench->below(4) * 0.25;
     bench->sim.run(3000);
   }
@@ -565,7 +607,7 @@ TEMPLATE_TEST_CASE("packet_rx: reset in the middle of anything leaves nothing", 
   auto bench = std::make_unique<Bench<TestType>>();
   for (int i = 0; i < 60; ++i) {
     bench->stopped = true;
-    for (int n = 0; n < 3; ++n) bench->send(bench->closed(bench->udp(bench->below(30))));
+    for (int n = 0; n < 3; ++n) bench->send(bench->closed(bench->udp(bench->below(n == 1 ? 600 : 30))));
     bench->sim.run(20 + bench->below(220));
     bench->queue.clear();
     bench->waiting.clear();
@@ -576,7 +618,7 @@ TEMPLATE_TEST_CASE("packet_rx: reset in the middle of anything leaves nothing", 
     bench->dut.s_valid = bench->dut.m_done = 0;
     bench->sim.reset();
     bench->stopped = false;
-    for (size_t n = 0; n < Traits<TestType>::kSlots; ++n)
+    for (size_t n = 0; n < Traits<TestType>::kGranules; ++n)
       bench->send(bench->closed(n % 2 ? bench->icmp(n) : bench->udp(n)), 0, n % 2 ? kGoodIcmp : kGoodUdp);
     bench->finish();
   }
