@@ -76,6 +76,8 @@ sub check_text {
         my $rigid = $file =~ /\.md$/ && $line =~ /^\s*(\||\[[^\]]*\]: )/;
         finding($file, $number, 'columns', length($line) . ' columns', $line)
           if length($line) > 120 && !$rigid && $file !~ /\.svg$/;
+        finding($file, $number, 'test_name', 'CTest takes a semicolon or bracket in a test\'s name for a list', $line)
+          if $line =~ /TEST_CASE(?:_METHOD)?\("[^"]*[;\[\]][^"]*"/;
         finding($file, $number, 'words', "promises later work: $1", $line) if $line =~ /\b($words)\b/;
         finding($file, $number, 'paths', "path of one machine: $1", $line) if $line =~ m{(?:^|[\s"'=(`])($homes)};
     }

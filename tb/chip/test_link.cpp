@@ -239,7 +239,7 @@ TEST_CASE("link: wrong frames of the chip are counted and do not get through") {
   CHECK(ping_with(Damage::kNone));
 }
 
-TEST_CASE("desk: cable out and in again; at rest when nothing is to come") {
+TEST_CASE("desk: cable out and in again, at rest when nothing is to come") {
   Bench b;
   REQUIRE(b.station.ping(10));
   b.desk.run_for(kMillisecond);

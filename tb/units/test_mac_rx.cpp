@@ -317,7 +317,7 @@ TEST_CASE("mac_rx: a reader that pauses loses beats with bit 5, and always gets 
   if (pause < 0.2) CHECK(whole > 0);
 }
 
-TEST_CASE("mac_rx: a verdict that waits long is kept; what comes meanwhile is dropped, what comes then is right") {
+TEST_CASE("mac_rx: a verdict that waits long is kept, what comes meanwhile is dropped, what comes then is right") {
   Bench bench(test_seed());
   std::mt19937 random(test_seed());
   for (const int frames : {1, 2, 3}) {

@@ -145,7 +145,7 @@ TEST_CASE("mac_tx: every length, gap of exactly 24 nibbles, slots in turn, full 
   CHECK(bench.flips == 0);
 }
 
-TEST_CASE("mac_tx: a collision at every nibble; late ones are not sent again") {
+TEST_CASE("mac_tx: a collision at every nibble, late ones are not sent again") {
   const bool carrier = GENERATE(false, true);
   Bench bench(test_seed(), false);
   std::mt19937 random(test_seed());
@@ -177,7 +177,7 @@ TEST_CASE("mac_tx: a collision at every nibble; late ones are not sent again") {
   CHECK(board.ok());
 }
 
-TEST_CASE("mac_tx: backoff within its range, spread evenly; sixteen collisions give a frame up") {
+TEST_CASE("mac_tx: backoff within its range, spread evenly, sixteen collisions give a frame up") {
   Bench bench(test_seed(), false);
   std::mt19937 random(test_seed());
   std::map<int, std::map<uint64_t, int>> seen;  // collision -> slots -> times
@@ -238,7 +238,7 @@ TEST_CASE("mac_tx: backoff within its range, spread evenly; sixteen collisions g
   }
 }
 
-TEST_CASE("mac_tx: waits for carrier; carrier in the gap's first part starts it again, later it does not") {
+TEST_CASE("mac_tx: waits for carrier, carrier in the gap's first part starts it again, later it does not") {
   Bench bench(test_seed(), false);
   std::mt19937 random(test_seed());
   for (int pulse = 0; pulse < 40; ++pulse) {
@@ -308,7 +308,7 @@ TEST_CASE("mac_tx: the preamble reads the source address, which stirs the random
   CHECK(seen.size() >= 7);
 }
 
-TEST_CASE("mac_tx: a reset within a frame, jam or backoff; the next frame is right") {
+TEST_CASE("mac_tx: a reset within a frame, jam or backoff, the next frame is right") {
   for (const int clocks : {10, 28, 40, 70, 90, 300}) {
     Bench bench(test_seed(), false);
     std::mt19937 random(test_seed());

@@ -256,7 +256,7 @@ TEMPLATE_TEST_CASE("packet_tx: every length of UDP and ICMP, and ARP", "", Vpack
   CHECK(bench->number == packets);
 }
 
-TEMPLATE_TEST_CASE("packet_tx: peers and own addresses of any kind; a peer changes while the other is served", "",
+TEMPLATE_TEST_CASE("packet_tx: peers and own addresses of any kind, a peer changes while the other is served", "",
                    Vpacket_tx_a, Vpacket_tx_b) {
   auto bench = std::make_unique<Bench<TestType>>();
   bench->max_wait = 60;
