@@ -21,6 +21,7 @@ mac_rx.vhd
 mac_tx.vhd
 packet_rx.vhd
 packet_tx.vhd
+ram_deep.vhd
 row_buffer.vhd
 map_buffer.vhd
 counters.vhd

@@ -13,8 +13,7 @@
 --              f_start has been given
 --   Bytes    : ceil(G_CELL_W/8) per cell, big endian, zeros above the cell, and one idle clock after each cell. f_valid
 --              and f_data hold until f_take
---   RAM      : a part of 9*k bits and one of the rest, because block RAMs are 9, 18, 36 bits wide when shallow and only
---              4, 2, 1 when deep: 31 bits as 27 + 4 need 28 blocks for 32760 cells where one RAM of 31 bits needs 31
+--   RAM      : ram_deep with columns of nine bits: 31 bits of 32760 cells in 28 blocks
 --   Forget   : release_map or clear, in any clock, also while cells come or bytes go; clear comes first on f_valid, too
 --   Golden   : sw/golden/map_buffer.hpp
 library ieee;
@@ -73,7 +72,6 @@ architecture rtl of map_buffer is
   constant C_TURN       : integer := imax(0, C_DEPTH - G_CHUNK_CELLS); -- where the ring's last chunk starts
   constant C_INDEX_W    : integer := clog2(G_CHUNK_CELLS);
   constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
-  constant C_NINES      : integer := G_CELL_W / 9 * 9;
 
   -- Write.
   signal forget     : std_logic;
@@ -197,35 +195,16 @@ begin
 
   end generate g_ring;
 
-  g_nines : if C_NINES > 0 generate
-
-    u_nines : entity work.ram_sdp
-      generic map (G_DATA_W => C_NINES, G_DEPTH => C_DEPTH, G_LATENCY => 1)
-      port map (
-        clk   => clk,
-        we    => fire,
-        waddr => w_addr,
-        wdata => s_tdata(C_NINES - 1 downto 0),
-        raddr => std_logic_vector(r_addr),
-        rdata => cell_word(C_NINES - 1 downto 0)
-      );
-
-  end generate g_nines;
-
-  g_rest : if C_NINES < G_CELL_W generate
-
-    u_rest : entity work.ram_sdp
-      generic map (G_DATA_W => G_CELL_W - C_NINES, G_DEPTH => C_DEPTH, G_LATENCY => 1)
-      port map (
-        clk   => clk,
-        we    => fire,
-        waddr => w_addr,
-        wdata => s_tdata(G_CELL_W - 1 downto C_NINES),
-        raddr => std_logic_vector(r_addr),
-        rdata => cell_word(G_CELL_W - 1 downto C_NINES)
-      );
-
-  end generate g_rest;
+  u_cells : entity work.ram_deep
+    generic map (G_DATA_W => G_CELL_W, G_DEPTH => C_DEPTH, G_NINES => G_CELL_W / 9 * 9)
+    port map (
+      clk   => clk,
+      we    => fire,
+      waddr => w_addr,
+      wdata => s_tdata,
+      raddr => std_logic_vector(r_addr),
+      rdata => cell_word
+    );
 
   -- Read -------------------------------------------------------------------------------------------------------------
   number_ok  <= to_bit(unsigned(f_chunk) = number);

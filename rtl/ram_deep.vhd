@@ -1,0 +1,189 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- ram_deep: ram_sdp for many words, in parts of 2**k words. Block RAMs are 2**k words deep (32768 of 1 bit, 16384 of 2
+--           bits, ..), so a part needs no multiplexer, where a RAM of any depth is made of as many short and wide
+--           blocks as its depth takes, with a multiplexer over all of them.
+--   Parts     : at most four, the largest power of two that fits first: 49280 words are 32768 + 16384 + 512. One more
+--               power of two instead of a rest that is less than 2048 words from it: 32760 words are 32768
+--   G_NINES   : so many low bits (a multiple of 9) of parts from 8192 words on are kept in a RAM of their own, which
+--               fits into blocks of 4096 * 9 bits: 8 blocks for 9 bits of 32768 words, not 9, and a multiplexer. 0: no
+--   Others    : latency 1, collision, addresses and reset as ram_sdp
+library ieee;
+  use ieee.std_logic_1164.all;
+  use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
+
+entity ram_deep is
+  generic (
+    G_DATA_W : integer := 16;
+    G_DEPTH  : integer := 49280;
+    G_NINES  : integer := 0
+  );
+  port (
+    clk   : in  std_logic;
+    we    : in  std_logic;
+    waddr : in  std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
+    wdata : in  std_logic_vector(G_DATA_W - 1 downto 0);
+    raddr : in  std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
+    rdata : out std_logic_vector(G_DATA_W - 1 downto 0)
+  );
+end entity ram_deep;
+
+architecture rtl of ram_deep is
+
+  constant C_MOST  : integer := 4;    -- parts: a multiplexer of one LUT6 a bit
+  constant C_GRAIN : integer := 2048; -- a block of 16 or 18 bits: less is not worth a part
+  constant C_LEAST : integer := 512;  -- half a block of 36 bits
+
+  -- Words of part n; 0: there is no such part.
+  function part_size (n : integer) return integer is
+    variable v_left : integer;
+    variable v_size : integer;
+  begin
+    v_left := G_DEPTH;
+    v_size := 0;
+    for i in 0 to n loop
+      if v_left <= 0 then
+        v_size := 0;
+      elsif i = 0 and v_left <= C_GRAIN then
+        v_size := v_left;
+      else
+        v_size := 2 ** clog2(imax(v_left, C_LEAST));
+        if v_size - v_left >= C_GRAIN and i < C_MOST - 1 then
+          v_size := v_size / 2;
+        end if;
+      end if;
+      v_left := v_left - v_size;
+    end loop;
+    return v_size;
+  end function part_size;
+
+  function part_count return integer is
+    variable v_count : integer;
+  begin
+    v_count := 1;
+    for i in 1 to C_MOST - 1 loop
+      if part_size(i) > 0 then
+        v_count := v_count + 1;
+      end if;
+    end loop;
+    return v_count;
+  end function part_count;
+
+  constant C_PARTS : integer := part_count;
+
+  subtype t_address is std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
+
+  subtype t_parts is std_logic_vector(C_PARTS downto 0);
+
+  -- Bit n: the address is not in a part before n. Sizes are falling powers of two, and all that follows a part is not
+  -- larger than it: so one address bit says whether the address lies behind it. The bit above the last part is '0'.
+  function behind (address : t_address) return std_logic_vector is
+    variable v_behind : t_parts;
+  begin
+    v_behind    := (others => '0');
+    v_behind(0) := '1';
+    for i in 1 to C_PARTS - 1 loop
+      v_behind(i) := v_behind(i - 1) and address(clog2(part_size(i - 1)));
+    end loop;
+    return v_behind;
+  end function behind;
+
+  signal w_behind : t_parts;
+  signal r_behind : t_parts;
+  signal words    : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+
+begin
+
+  assert G_DATA_W >= 1
+    report "ram_deep: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    severity failure;
+  assert G_DEPTH >= 2
+    report "ram_deep: G_DEPTH=" & integer'image(G_DEPTH) & " below 2"
+    severity failure;
+  assert G_NINES >= 0 and G_NINES <= G_DATA_W and G_NINES mod 9 = 0
+    report "ram_deep: G_NINES=" & integer'image(G_NINES) & " is no multiple of 9 up to G_DATA_W"
+    severity failure;
+
+  w_behind <= behind(waddr);
+
+  g_parts : for i in 0 to C_PARTS - 1 generate
+    constant C_SIZE   : integer := part_size(i);
+    constant C_PART_W : integer := clog2(C_SIZE);
+    constant C_SPLIT  : boolean := G_NINES > 0 and G_NINES < G_DATA_W and C_SIZE >= 8192;
+    signal we_part : std_logic;
+  begin
+
+    we_part <= we and w_behind(i) and not w_behind(i + 1);
+
+    g_one : if not C_SPLIT generate
+
+      u_part : entity work.ram_sdp
+        generic map (G_DATA_W => G_DATA_W, G_DEPTH => C_SIZE, G_LATENCY => 1)
+        port map (
+          clk   => clk,
+          we    => we_part,
+          waddr => waddr(C_PART_W - 1 downto 0),
+          wdata => wdata,
+          raddr => raddr(C_PART_W - 1 downto 0),
+          rdata => words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W)
+        );
+
+    end generate g_one;
+
+    g_two : if C_SPLIT generate
+
+      u_nines : entity work.ram_sdp
+        generic map (G_DATA_W => G_NINES, G_DEPTH => C_SIZE, G_LATENCY => 1)
+        port map (
+          clk   => clk,
+          we    => we_part,
+          waddr => waddr(C_PART_W - 1 downto 0),
+          wdata => wdata(G_NINES - 1 downto 0),
+          raddr => raddr(C_PART_W - 1 downto 0),
+          rdata => words(i * G_DATA_W + G_NINES - 1 downto i * G_DATA_W)
+        );
+
+      u_rest : entity work.ram_sdp
+        generic map (G_DATA_W => G_DATA_W - G_NINES, G_DEPTH => C_SIZE, G_LATENCY => 1)
+        port map (
+          clk   => clk,
+          we    => we_part,
+          waddr => waddr(C_PART_W - 1 downto 0),
+          wdata => wdata(G_DATA_W - 1 downto G_NINES),
+          raddr => raddr(C_PART_W - 1 downto 0),
+          rdata => words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W + G_NINES)
+        );
+
+    end generate g_two;
+
+  end generate g_parts;
+
+  -- synthesis translate_off
+  p_check : process (clk)
+  begin
+    if rising_edge(clk) then
+      assert to_integer(unsigned(raddr)) < G_DEPTH and (we /= '1' or to_integer(unsigned(waddr)) < G_DEPTH)
+        report "ram_deep: address beyond G_DEPTH"
+        severity failure;
+    end if;
+  end process p_check;
+  -- synthesis translate_on
+
+  p_part : process (clk)
+  begin
+    if rising_edge(clk) then
+      r_behind <= behind(raddr);
+    end if;
+  end process p_part;
+
+  p_pick : process (words, r_behind)
+  begin
+    rdata <= words(G_DATA_W - 1 downto 0);
+    for i in 1 to C_PARTS - 1 loop
+      if r_behind(i) = '1' then
+        rdata <= words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
+      end if;
+    end loop;
+  end process p_pick;
+
+end architecture rtl;
