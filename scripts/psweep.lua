@@ -775,18 +775,18 @@ local function dissect(tvb, pinfo, root)
     end
     local threshold = m.threshold
 
-    if version ~= VERSION then
-      take_rest(m, tree, f.data)
+    local left_over = f.padding
+    if version ~= VERSION or (m.is_request and not known) or (not m.is_request and not known and m.code == 0) then
+      left_over = f.data
     elseif m.is_request then
-      local payload = request_payload[m.type]
-      if payload then text = payload(m, tree) end
+      text = request_payload[m.type](m, tree)
     elseif m.is_map then
       text = map_payload(m, tree)
     elseif m.code == 0 and m.type == INFO + REPLY then
       text = info_payload(m, tree)
     elseif m.code == 0 and m.type == COUNTERS + REPLY then
       text = counters_payload(m, tree)
-    elseif known or m.code ~= 0 then
+    else
       text = status_payload(m, tree)
     end
     if not m.is_request and not m.is_map then
@@ -794,7 +794,7 @@ local function dissect(tvb, pinfo, root)
       if m.code ~= 0 then tree:add_proto_expert_info(e.code, name .. " was answered with: " .. code) end
       text = code .. (text ~= "" and ": " .. text or "")
     end
-    take_rest(m, tree, (known and version == VERSION) and f.padding or f.data)
+    take_rest(m, tree, left_over)
 
     if not (found and pinfo.visited) and track then
       found = note(m, pinfo, conversation)
