@@ -155,6 +155,7 @@ architecture rtl of arbiter is
   signal w_valid        : std_logic;
   signal w_data         : std_logic_vector(7 downto 0);
   signal w_commit       : std_logic;
+  signal b_hold         : std_logic;
   signal b_index        : std_logic_vector(9 downto 0);
   signal b_bit          : std_logic;
   signal map_release    : std_logic;
@@ -354,6 +355,7 @@ begin
       w_valid         => w_valid,
       w_data          => w_data,
       w_commit        => w_commit,
+      b_hold          => b_hold,
       b_index         => b_index,
       b_bit           => b_bit,
       map_release     => map_release,
@@ -542,6 +544,7 @@ begin
       w_valid     => w_valid,
       w_data      => w_data,
       w_commit    => w_commit,
+      b_hold      => b_hold,
       b_index     => b_index,
       b_bit       => b_bit,
       complete    => row_complete,

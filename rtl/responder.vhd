@@ -86,6 +86,7 @@ entity responder is
     w_valid      : out std_logic;
     w_data       : out std_logic_vector(7 downto 0);
     w_commit     : out std_logic;
+    b_hold       : out std_logic; -- a status block is read: base, received and bitmap must be of one moment
     b_index      : out std_logic_vector(9 downto 0);
     b_bit        : in  std_logic;
 
@@ -422,6 +423,8 @@ begin
   at_end    <= to_bit(out_word = out_end and out_byte = 3);
   body_index <= out_word(4 downto 0) - 4;
   c_index   <= std_logic_vector(body_index);
+  -- From the first word of a status block to the last.
+  b_hold    <= not in_header and not lists and not is_map;
   b_index   <= std_logic_vector(resize(out_word - 13, 5) & out_byte & step(2 downto 0));
 
   status <= "00000" & engine_state & pin_speed_100 & (duplex_mode(1) or (pin_full_duplex and not duplex_mode(0)))

@@ -9,8 +9,9 @@
 --   Writing  : w_check (not in the clock of a w_commit), answer two clocks later, the same until the next w_check
 --              (clear and open_tile take w_new back). Then G_CHUNK_PAIRS * C_PAIR_BYTES bytes, {left, right} big
 --              endian, then w_commit. w_repeated holds for consumed chunks of a finished tile, too
---   Bitmap   : b_bit shows b_index two clocks later. A bit that changes in between is old or new ('X' in simulation
---              if in the very clock of its reading), and index 0 is the base of that clock
+--   Bitmap   : b_bit shows b_index two clocks later, index 0 being the base. While b_hold no chunk ends, so that base,
+--              received and all bits read meanwhile are of one moment (the output waits at the end of its chunk).
+--              Without it a bit that changes in between is old or new ('X' in simulation in the clock of its reading)
 --   Output   : a pair per clock while chunks are there; one clock late if the last pair of a chunk is due in the
 --              clock of a w_check or w_commit. m_tdata has left in the low half. First pair 3 clocks after go
 --   busy     : from open_tile until the last pair is taken and all bits are zero again (2^clog2(G_SLOTS) clocks after
@@ -49,6 +50,7 @@ entity row_buffer is
     w_data     : in  std_logic_vector(7 downto 0);
     w_commit   : in  std_logic;
 
+    b_hold  : in  std_logic;
     b_index : in  std_logic_vector(9 downto 0);
     b_bit   : out std_logic;
 
@@ -329,8 +331,9 @@ begin
 
   -- Output -----------------------------------------------------------------------------------------------------------
   chunk_last <= to_bit(r_addr >= C_LAST) or left_one;
-  -- The bits have one write port, and no check may meet a change.
-  issue      <= running and here and (m_tready or not out_valid) and not (chunk_last and (w_check or w_commit));
+  -- The bits have one write port, no check may meet a change, and the bitmap is one picture.
+  issue      <= running and here and (m_tready or not out_valid)
+                and not (chunk_last and (w_check or w_commit or b_hold));
   chunk_end  <= issue and chunk_last;
   out_valid  <= r_valid or hold_valid;
   out_pair   <= hold_pair when hold_valid = '1' else read_pair;

@@ -8,10 +8,9 @@
 namespace psweep::net {
 namespace {
 
-constexpr double kFirstPatience = 0.03;   // before anything was measured
-constexpr double kLeastPatience = 0.004;  // the host's own scheduling
-constexpr double kMostPatience = 0.5;     // so that a cable put back is noticed soon (or 4 round trips)
-constexpr double kBusyPause = 0.25;       // between two OPEN at a busy chip
+constexpr double kFirstPatience = 0.03;  // before anything was measured
+constexpr double kMostPatience = 0.5;    // so that a cable put back is noticed soon (or 4 round trips)
+constexpr double kBusyPause = 0.25;      // between two OPEN at a busy chip
 
 std::string seconds(double s) {
   char text[32];
@@ -118,7 +117,7 @@ uint64_t Client::random() {  // splitmix64
 }
 
 double Client::patience() const {
-  const double once = has_rtt_ ? std::max(kLeastPatience, statistics_.rtt + 4 * rtt_variation_) : kFirstPatience;
+  const double once = has_rtt_ ? std::max(least_patience_, statistics_.rtt + 4 * rtt_variation_) : kFirstPatience;
   return std::min(once * backoff_, std::max({once, kMostPatience, 4 * statistics_.rtt}));
 }
 
@@ -156,7 +155,6 @@ uint64_t Client::send(Type type, uint16_t tile, uint16_t index, const Bytes& pay
   Bytes packet = encode(h);
   packet.resize(kHeaderBytes + payload.size());
   std::copy(payload.begin(), payload.end(), packet.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes));
-  if (type != kWrite && type != kTable) packet.resize(std::max(packet.size(), least_bytes_));
   ++statistics_.packets_sent;
   statistics_.bytes_sent += packet.size();
   transport_.send(packet);
@@ -288,11 +286,6 @@ Reply Client::request(Type type, uint16_t tile, uint16_t index, const Bytes& pay
 Capabilities Client::info() {
   const auto c = parse_info(request(kInfo).words);
   capabilities_ = *c;  // take() has checked
-  // A chip with two receive slots loses the second of two requests behind a WRITE that it answers, if they arrive while
-  // it does: chunk, reply and header of the reply take about so many clocks. Padding, which it ignores, makes the first
-  // of them last longer (12.5 bytes in a microsecond at 100 Mbit/s, 66 of a frame are not payload).
-  const double clocks = c->config.chunk_bytes + 700;
-  least_bytes_ = static_cast<size_t>(std::clamp(12.5e3 * clocks / c->config.clk_khz - 66, 0.0, 600.0));
   return *c;
 }
 

@@ -111,6 +111,8 @@ class Client {
   // Seconds to wait for an answer; grows with every silence() until something is heard.
   double patience() const;
   void silence();
+  // The least patience once a round trip is known. At first 4 ms, for the host's own scheduling.
+  void least_patience(double seconds) { least_patience_ = seconds; }
   // Seconds since the last valid packet, or since the first unanswered request.
   double silent_for() { return now() - std::max(heard_, asked_); }
   // Throws LinkError if that is longer than the timeout.
@@ -139,12 +141,11 @@ class Client {
   uint32_t token_ = 0, nonce_ = 0;
   std::optional<Capabilities> capabilities_;
   uint16_t sequence_ = 0;
-  size_t least_bytes_ = 0;  // of requests that may be padded
   uint64_t order_ = 0;
   std::vector<Sent> sent_;  // by sequence
   double heard_ = 0, asked_ = 0;
   bool has_rtt_ = false;
-  double rtt_variation_ = 0, backoff_ = 1;
+  double rtt_variation_ = 0, backoff_ = 1, least_patience_ = 0.004;
   LinkStatistics statistics_;
 };
 

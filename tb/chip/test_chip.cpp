@@ -2,6 +2,7 @@
 // The whole chip from the pins on, over the in-process link, in simulated time: ARP, ping, capabilities, whole tiled
 // pairs by the host library, cell by cell equal to the model, without and with faults, in half duplex, at several
 // clocks, with the smallest buffers; cable pulled, chip reset, a second host, a host that falls silent; recordings.
+#include <bitset>
 #include <filesystem>
 #include <set>
 
@@ -33,12 +34,13 @@ DeskSettings settings_for(const Chip& chip) {
   return s;
 }
 
-// Does things at given simulated times, while the client waits.
+// Does things at given simulated times, while the client waits. Looks at every status block on its way.
 class Eventful : public ChipTransport {
  public:
   using ChipTransport::ChipTransport;
   std::vector<std::pair<Time, std::function<void(Desk&)>>> events;  // ascending
   Desk* desk = nullptr;
+  uint64_t blocks = 0, torn = 0;  // status blocks; those whose words are not of one moment
 
   std::optional<net::Bytes> receive(double timeout_s) override {
     const Time end = desk->now() + to_time(timeout_s);
@@ -49,8 +51,25 @@ class Eventful : public ChipTransport {
       }
       const Time until = events.empty() ? end : std::min(end, events.front().first);
       auto packet = ChipTransport::receive(static_cast<double>(std::max<Time>(0, until - desk->now())) / kSecond);
+      if (packet) look_at(*packet);
       if (packet || until == end) return packet;
     }
+  }
+
+ private:
+  void look_at(const net::Bytes& packet) {
+    const auto h = net::decode(packet);
+    if (!h || h->type == (net::kInfo | net::kReply) || h->type == (net::kCounters | net::kReply) ||
+        h->type == net::kMap)
+      return;
+    std::vector<uint32_t> words;
+    for (size_t at = net::kHeaderBytes; at + 4 <= packet.size(); at += 4) words.push_back(net::get32(packet, at));
+    const auto s = net::parse_status(words);
+    if (!s) return;
+    ++blocks;
+    size_t chunks = s->base;
+    for (const uint32_t word : s->bitmap) chunks += std::bitset<32>(word).count();
+    torn += chunks != s->received;
   }
 };
 
@@ -97,6 +116,8 @@ struct Bench {
     statistics = client.statistics();
     INFO(board.report());
     CHECK(board.ok());
+    CHECK(transport.blocks > 0);
+    CHECK(transport.torn == 0);
     CHECK(static_cast<int>(done.size()) == count);
     CHECK(desk.link().violations() <= cut_frames);
     tiles = count;

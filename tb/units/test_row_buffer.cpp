@@ -37,6 +37,7 @@ struct Rates {
   double stray = 0.2;       // a chunk that is not what the tile needs
   double clear = 0;         // per clock
   bool sequential = false;  // chunks in order
+  double hold = 0;          // b_hold rises, for up to 60 clocks
 };
 
 // Drives everything and compares in every clock. One tile after the other, of random sizes.
@@ -51,7 +52,7 @@ class Bench : public Agent {
         rates_(rates),
         max_chunks_(max_chunks),
         random_(seed) {
-    dut.clear = dut.open_tile = dut.w_check = dut.w_valid = dut.w_commit = dut.go = dut.m_tready = 0;
+    dut.clear = dut.open_tile = dut.w_check = dut.w_valid = dut.w_commit = dut.go = dut.m_tready = dut.b_hold = 0;
     sim.add(*this);
     sim.reset();
     quiet_from_ = 0;
@@ -61,7 +62,7 @@ class Bench : public Agent {
   Dut& dut;
   golden::RowBuffer model;
   Scoreboard pixels{"pixels"}, answers{"answers"}, bits{"bitmap"}, status{"status"};
-  int tiles_done = 0, clears = 0, new_chunks = 0, repeated = 0, refused = 0;
+  int tiles_done = 0, clears = 0, new_chunks = 0, repeated = 0, refused = 0, holds = 0;
   uint64_t go_clock = 0, first_clock = 0, last_clock = 0;  // of the latest tile: go, first and last beat
 
   bool ok() const { return pixels.ok() && answers.ok() && bits.ok() && status.ok(); }
@@ -74,6 +75,9 @@ class Bench : public Agent {
     dut.open_pixels = draw(1 << 24);
     dut.open_chunks = static_cast<SData>(random_());
     dut.m_tready = !chance(rates_.stall);
+    if (hold_left_ > 0) --hold_left_;
+    if (hold_left_ == 0 && chance(rates_.hold)) hold_left_ = 1 + draw(60);
+    dut.b_hold = hold_left_ > 0;
     dut.b_index = static_cast<SData>(chance(0.9) ? draw(shape_.slots) : random_() & 0x3ff);
     if (chance(rates_.clear)) {
       dut.clear = 1;
@@ -98,7 +102,13 @@ class Bench : public Agent {
 
   void sample() override {
     const uint64_t now = sim.cycle();
-    // Status.
+    // Status. A clock of b_hold lets the base stand in the next one.
+    if (was_held_) {
+      status.compare(dut.base, base_before_, {tile_count_}, now);
+      ++holds;
+    }
+    was_held_ = dut.b_hold && !dut.clear && !dut.open_tile;
+    base_before_ = dut.base;
     if (!clearing_) {
       const int low = model.chunks_of(taken_), high = model.chunks_of(std::min(taken_ + 1, model.pixels()));
       if (tile_) {
@@ -255,6 +265,9 @@ class Bench : public Agent {
   int max_chunks_;
   std::mt19937 random_;
   bool tile_ = false, gone_ = false, clearing_ = true, writing_ = false, held_ = false, complete_before_ = false;
+  bool was_held_ = false;
+  uint64_t base_before_ = 0;
+  uint32_t hold_left_ = 0;
   int tile_count_ = 0, wait_ = 0, chunk_ = 0;
   uint32_t taken_ = 0;
   uint64_t held_data_ = 0, quiet_from_ = 0, answer_due_ = ~uint64_t{0};
@@ -276,6 +289,7 @@ void run_tiles(const Shape& shape, const Rates& rates, int max_chunks, int tiles
   CHECK(bench.new_chunks > 0);
   if (rates.clear < 0.01) CHECK((bench.repeated > 0 && bench.refused > 0));
   if (rates.clear > 0) CHECK(bench.clears > 0);
+  if (rates.hold > 0) CHECK(bench.holds > 0);
 }
 
 template <class Dut>
@@ -284,8 +298,8 @@ void run_all(const Shape& shape, int tiles) {
   const int few = std::max(1, shape.slots);                                  // whole tiles
   run_tiles<Dut>(shape, {0.0, 0.0, 0.2, 0.0, false}, chunks, tiles);
   run_tiles<Dut>(shape, {0.3, 0.0, 0.3, 0.0, false}, chunks, tiles);
-  run_tiles<Dut>(shape, {0.0, 0.6, 0.5, 0.0, false}, chunks, tiles);
-  run_tiles<Dut>(shape, {0.2, 0.3, 0.2, 0.0, false}, few, tiles);
+  run_tiles<Dut>(shape, {0.0, 0.6, 0.5, 0.0, false, 0.01}, chunks, tiles);
+  run_tiles<Dut>(shape, {0.2, 0.3, 0.2, 0.0, false, 0.1}, few, tiles);
   run_tiles<Dut>(shape, {0.1, 0.2, 0.2, 0.5 / (chunks * shape.chunk_pairs), false}, chunks, tiles);
   run_tiles<Dut>(shape, {0.1, 0.2, 0.2, 0.05, false}, 2, std::max(2, tiles / 10));
 }
