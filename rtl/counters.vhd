@@ -1,11 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- counters: G_COUNT event counters of 32 bits in one RAM with one adder; they wrap.
---   Events   : a pulse sets a pending bit; a scanner visits one counter every 4 clocks, adds its bit and clears it. So
---              each event may pulse once in 4*G_COUNT clocks; faster pulses of one event count as one
+--   Events   : a pulse sets a pending bit. A scanner adds them to the counters, one every 4 clocks; four bits at a time
+--              move into a shift register before, which takes less logic than to pick and clear single ones. So each
+--              event may pulse once in 4*G_COUNT clocks; faster pulses of one event count as one. Counted after at
+--              most 4*G_COUNT + 15 clocks
 --   Read     : r_valid = '1': r_data is the counter r_index, read after r_index became what it is; both hold until
 --              r_index changes. Up to 7 clocks later. A number from G_COUNT on reads something without meaning
---   Phases   : 0 read the scanned counter, 1 write it back, 2 read r_index, 3 take it
---   Reset    : rst only. A first scan of 4*G_COUNT clocks writes zeros; events before its end are lost, r_valid is '0'
+--   Phases   : words are kept in halves, for an adder of 16 bits: 0 read the lower half of the scanned counter, 1 write
+--              it back, read the upper one, 2 write it back, read the lower half of r_index, 3 take it, read the upper
+--              half; 0 take it
+--   Reset    : rst only. A first scan of 4*G_COUNT clocks writes zeros; events until then may be lost, r_valid is '0'
 --   Golden   : sw/golden/counters.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -28,19 +32,29 @@ end entity counters;
 
 architecture rtl of counters is
 
-  constant C_INDEX_W : integer := clog2(G_COUNT);
+  constant C_INDEX_W : integer := imax(3, clog2(G_COUNT));
+  constant C_GROUPS  : integer := 2 ** (C_INDEX_W - 2);
 
   signal phase    : unsigned(1 downto 0);
   signal scan     : unsigned(C_INDEX_W - 1 downto 0);
   signal first    : std_logic; -- scan after reset
-  signal pending  : std_logic_vector(G_COUNT - 1 downto 0);
-  signal increase : unsigned(0 downto 0);
+  signal four     : unsigned(C_INDEX_W - 3 downto 0);
+  signal move     : std_logic;
+  signal wide     : std_logic_vector(4 * C_GROUPS - 1 downto 0); -- events
+  signal pending  : std_logic_vector(4 * C_GROUPS - 1 downto 0);
+  signal moved    : std_logic_vector(3 downto 0);
+  signal due      : std_logic_vector(3 downto 0); -- of the group, the scanned one first
+  signal add      : unsigned(0 downto 0);
+  signal carry    : std_logic;
+  signal addend   : unsigned(15 downto 0);
+  signal sum      : unsigned(16 downto 0);
   signal write    : std_logic;
-  signal raddr    : std_logic_vector(C_INDEX_W - 1 downto 0);
-  signal rdata    : std_logic_vector(31 downto 0);
-  signal wdata    : std_logic_vector(31 downto 0);
+  signal waddr    : std_logic_vector(C_INDEX_W downto 0);
+  signal raddr    : std_logic_vector(C_INDEX_W downto 0);
+  signal rdata    : std_logic_vector(15 downto 0);
   signal index_q  : std_logic_vector(4 downto 0);
   signal same     : std_logic;
+  signal half     : std_logic; -- the lower half of r_index is there
   signal have     : std_logic;
 
 begin
@@ -49,27 +63,42 @@ begin
     report "counters: G_COUNT=" & integer'image(G_COUNT) & " outside 1..32"
     severity failure;
 
-  write <= to_bit(phase = 1);
-  raddr <= r_index(C_INDEX_W - 1 downto 0) when phase(1) = '1' else std_logic_vector(scan);
-  wdata <= (others => '0') when first = '1' else std_logic_vector(unsigned(rdata) + increase);
+  four     <= scan(C_INDEX_W - 1 downto 2);
+  move     <= to_bit(phase = 0) and to_bit(scan(1 downto 0) = 0);
+  write    <= phase(1) xor phase(0);
+  waddr    <= std_logic_vector(scan) & phase(1);
+  raddr    <= r_index(C_INDEX_W - 1 downto 0) & phase(0) when phase(1) = '1' else std_logic_vector(scan) & phase(0);
 
-  p_pick : process (pending, scan)
+  -- Zeros go in, not out: so they cost nothing.
+  add(0)   <= not first and due(0) when phase(0) = '1' else not first and carry;
+  addend   <= (others => '0') when first = '1' else unsigned(rdata);
+  sum      <= ('0' & addend) + add;
+
+  g_column : for i in 0 to 3 generate
+    signal column : std_logic_vector(C_GROUPS - 1 downto 0);
   begin
-    increase <= "0";
-    for i in 0 to G_COUNT - 1 loop
-      if scan = i then
-        increase(0) <= pending(i);
-      end if;
-    end loop;
-  end process p_pick;
+
+    g_bit : for k in 0 to C_GROUPS - 1 generate
+      column(k) <= pending(4 * k + i);
+    end generate g_bit;
+
+    moved(i) <= column(to_integer(four));
+
+  end generate g_column;
+
+  p_wide : process (events)
+  begin
+    wide                       <= (others => '0');
+    wide(G_COUNT - 1 downto 0) <= events;
+  end process p_wide;
 
   u_words : entity work.ram_sdp
-    generic map (G_DATA_W => 32, G_DEPTH => 2 ** C_INDEX_W, G_LATENCY => 1)
+    generic map (G_DATA_W => 16, G_DEPTH => 2 ** (C_INDEX_W + 1), G_LATENCY => 1)
     port map (
       clk   => clk,
       we    => write,
-      waddr => std_logic_vector(scan),
-      wdata => wdata,
+      waddr => waddr,
+      wdata => std_logic_vector(sum(15 downto 0)),
       raddr => raddr,
       rdata => rdata
     );
@@ -78,6 +107,7 @@ begin
   begin
     if rising_edge(clk) then
       phase <= phase + 1;
+      carry <= sum(16);
       if phase = 3 then
         scan <= scan + 1;
         if scan = G_COUNT - 1 then
@@ -85,10 +115,17 @@ begin
           first <= '0';
         end if;
       end if;
-      for i in 0 to G_COUNT - 1 loop
-        if events(i) = '1' then
+      if move = '1' then
+        due <= moved;
+      elsif phase = 3 then
+        due <= '0' & due(3 downto 1);
+      end if;
+      for i in 0 to 4 * C_GROUPS - 1 loop
+        if i >= G_COUNT then
+          pending(i) <= '0';
+        elsif wide(i) = '1' then
           pending(i) <= '1';
-        elsif write = '1' and scan = i then
+        elsif move = '1' and four = i / 4 then
           pending(i) <= '0';
         end if;
       end loop;
@@ -100,7 +137,7 @@ begin
     end if;
   end process p_scan;
 
-  -- In phase 3, same says that rdata belongs to r_index.
+  -- Says that rdata belongs to r_index, where it is taken.
   same    <= to_bit(r_index = index_q);
   r_valid <= have and same;
 
@@ -108,13 +145,16 @@ begin
   begin
     if rising_edge(clk) then
       index_q <= r_index;
-      if same = '0' then
-        have <= '0';
-      elsif phase = 3 and have = '0' and first = '0' then
-        have   <= '1';
-        r_data <= rdata;
+      if phase = 3 and have = '0' then
+        half                <= not first;
+        r_data(15 downto 0) <= rdata;
       end if;
-      if rst = '1' then
+      if phase = 0 and have = '0' then
+        have                 <= half;
+        r_data(31 downto 16) <= rdata;
+      end if;
+      if same = '0' or rst = '1' then
+        half <= '0';
         have <= '0';
       end if;
     end if;

@@ -15,6 +15,7 @@ class Counters {
       : values_(static_cast<size_t>(count), 0), previous_(static_cast<size_t>(count), 0), spacing_(4 * count) {}
 
   uint64_t spacing() const { return static_cast<uint64_t>(spacing_); }  // least clocks between pulses of one event
+  uint64_t counted_after() const { return spacing() + 15; }             // clocks at most
 
   void pulse(int event, uint64_t clock) {
     const auto n = static_cast<size_t>(event);

@@ -72,16 +72,17 @@ class Bench : public Agent {
     const uint64_t now = sim.cycle();
     const int n = dut.r_index;
     if (dut.r_valid && n < count_) {
-      // Counted by then: everything older than a scan before the index came; nothing that came after this clock.
+      // Counted by then: everything older than that before the index came, and its reading; nothing that came after
+      // this clock.
       const uint32_t all = model.value(n);
-      const uint64_t old = now - std::min(now, steady_ + 2 * model.spacing());
+      const uint64_t old = now - std::min(now, steady_ + 7 + model.counted_after());
       uint32_t recent = 0;
       const auto& pulses = pulses_[static_cast<size_t>(n)];
       for (auto p = pulses.rbegin(); p != pulses.rend() && *p >= old; ++p) ++recent;
       const Place place{-1, n, 0, 0};
       const uint32_t value = dut.r_data;
       board.compare(value + recent >= all && value <= all ? all : value, all, place, now);
-      if (quiet_for_ > model.spacing() + steady_) board.compare(value, all, place, now);
+      if (quiet_for_ > model.counted_after() + steady_) board.compare(value, all, place, now);
       if (was_valid_ && steady_ > 0) board.compare(value, previous_, place, now);  // holds
       if (!was_valid_ || steady_ == 0) {
         longest_read = std::max(longest_read, steady_);
@@ -103,7 +104,7 @@ class Bench : public Agent {
   // Every counter, after all events have been counted.
   void read_all() {
     quiet = hold_index = true;
-    sim.run(model.spacing() + 4);
+    sim.run(model.counted_after() + 1);
     for (int i = 0; i < count_; ++i) {
       index((i + 1) & 31);  // another one in between, so that it is read afresh
       sim.tick();
