@@ -19,6 +19,7 @@ local MAGIC, VERSION, HEADER, REPLY = 0x5053, 1, 16, 0x80
 local OPEN, CLOSE, INFO, COUNTERS, STATUS, TABLE, START, WRITE, READ, RELEASE, SET = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 local MAP = 0x8c
 local MOST_TABLE_WORDS = 364
+local DOUBLED_WITHIN = 256 -- requests; sequence numbers come again after 65536
 local POSITION_ONE = 524288 -- 1 px in sfix(13,19) and ufix(2,19)
 
 local names = { [OPEN] = "OPEN", [CLOSE] = "CLOSE", [INFO] = "INFO", [COUNTERS] = "COUNTERS", [STATUS] = "STATUS",
@@ -242,11 +243,11 @@ local function note_request(conversation, pinfo, m, extra)
   local now = { frame = pinfo.number, time = pinfo.rel_ts, type = m.type, tile = m.tile, index = m.index,
                 order = conversation.order, wanted = m.type ~= WRITE or m.flags % 2 == 1 }
   conversation.order = conversation.order + 1
-  -- The same packet once more (doubled on the way): replies go with the first one. Half a turn of the sequence later it
-  -- is another request.
+  -- The same packet once more (doubled on the way): replies go with the first one. Later, when sequence numbers come
+  -- again, it is another request.
   local same = conversation.pending[m.sequence]
   local doubled = same and same.type == m.type and same.tile == m.tile and same.index == m.index and
-    now.order - same.order < 32768
+    now.order - same.order < DOUBLED_WITHIN
   if not doubled then conversation.pending[m.sequence] = now end
   local record = doubled and same or now
 

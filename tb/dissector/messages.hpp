@@ -38,6 +38,7 @@ class Message {
   size_t needed = 0;    // shorter is truncated
   bool request = true;  // direction
   bool wanted = true;   // somebody waits for an answer
+  bool other_version = false;
   net::Header header;
 
   // `tail`: what depends on the length; called for those that reach the payload.
@@ -65,7 +66,7 @@ class Message {
     leaf("index", 14, 2, h.index);
     const uint8_t type = is_request ? h.type : static_cast<uint8_t>(h.type - net::kReply);
     const bool map = !is_request && h.type == net::kMap && h.flags == net::kOk;
-    if (version != net::kVersion) header_experts.insert("version");
+    other_version = version != net::kVersion;
     if (!map && (type == 0 || type > net::kSet)) header_experts.insert("type");
     if (!is_request && h.flags != net::kOk) header_experts.insert("code");
   }
@@ -119,6 +120,7 @@ class Message {
     if (padding_at_ != 0 && n > padding_at_)
       e.add("psweep." + padding_name_, static_cast<long>(padding_at_), static_cast<long>(n - padding_at_), kAny);
     if (n < needed) e.experts.insert("truncated");
+    if (n > 2 && other_version) e.experts.insert("version");
     if (n >= net::kHeaderBytes) {
       e.experts.insert(header_experts.begin(), header_experts.end());
       if (n == bytes.size()) e.experts.insert(whole_experts.begin(), whole_experts.end());

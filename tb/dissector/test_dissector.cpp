@@ -99,25 +99,32 @@ class Trace {
   std::vector<Bytes> frames_;
 };
 
-// Every expected field is there, with place and value, and no other; the bytes tshark took are the message's.
-void check_frame(const Dissection& got, const Expectation& expected, const Bytes& payload, const std::string& what) {
-  INFO("frame " << got.frame << ", " << what << ", " << payload.size() << " bytes: " << got.info);
-  REQUIRE(got.psweep);
-  std::multiset<std::string> missing, extra;
-  for (const Field& f : expected.fields) missing.insert(f.text());
+// The bytes that tshark took for a field are the message's at this place.
+void check_bytes(const Dissection& got, const Bytes& payload) {
+  std::string differences;
   for (const Field& f : got.fields) {
-    if (f.at >= 0 && static_cast<size_t>(f.at + f.size) <= payload.size() && !f.raw.empty()) {
-      std::string hex;
+    if (f.at < 0 || f.raw.empty()) continue;
+    std::string hex;
+    if (static_cast<size_t>(f.at + f.size) <= payload.size()) {
       char digits[3];
       for (long i = f.at; i < f.at + f.size; ++i) {
         std::snprintf(digits, sizeof digits, "%02x", payload[static_cast<size_t>(i)]);
         hex += digits;
       }
-      if (f.raw != hex) {
-        INFO(f.name);
-        CHECK(f.raw == hex);
-      }
     }
+    if (f.raw != hex) differences += "\n  " + f.text() + ": bytes " + f.raw + ", in the message " + hex;
+  }
+  CHECK(differences == "");
+}
+
+// Every expected field is there, with place and value, and no other.
+void check_frame(const Dissection& got, const Expectation& expected, const Bytes& payload, const std::string& what) {
+  INFO("frame " << got.frame << ", " << what << ", " << payload.size() << " bytes: " << got.info);
+  REQUIRE(got.psweep);
+  check_bytes(got, payload);
+  std::multiset<std::string> missing, extra;
+  for (const Field& f : expected.fields) missing.insert(f.text());
+  for (const Field& f : got.fields) {
     auto hit = missing.find(f.text());
     if (hit == missing.end()) {  // groups and bytes: place and bytes only
       Field any = f;
@@ -375,4 +382,390 @@ TEST_CASE("dissector: every field of every message, with and without the layout 
     expect_alone(e, all[i], all[i].bytes.size());
     check_frame(got[i], e, all[i].bytes, all[i].what);
   }
+}
+
+TEST_CASE("dissector: messages cut at every length, by the sender and by the capture") {
+  if (skipped()) return;
+  const bool captured = GENERATE(false, true);
+  Random random(test_seed());
+  TemporaryDir dir;
+  Trace trace;
+  struct Cut {
+    size_t message, size;
+  };
+  std::vector<Cut> cuts;
+  std::vector<Message> all;
+  for (const bool told : {true, false}) {
+    const net::Address chip = chip_at(told ? 0x0a050002 : 0x0a050003);
+    Layout layout;
+    if (told) {
+      layout = random_config(random);
+      layout->row_slots = 40;
+      tell_layout(trace, all, random, *layout, chip);
+      cuts.push_back({0, all[0].bytes.size()});
+    }
+    for (Message& m : messages_of_all_kinds(random, layout, true)) {
+      // A capture that lost a little of everything says enough with every third length.
+      for (size_t n = m.bytes.size(); n >= 2; n -= captured && n > 20 ? 3 : 1) {
+        add_alone(trace, m, chip, captured ? m.bytes : Bytes(m.bytes.begin(), m.bytes.begin() + static_cast<long>(n)));
+        cuts.push_back({all.size(), n});
+      }
+      all.push_back(std::move(m));
+    }
+  }
+  std::function<size_t(long)> keep;
+  if (captured) keep = [&](long frame) { return cuts[static_cast<size_t>(frame) - 1].size; };
+  const auto got = Tshark(dir).dissect(trace.write(dir, keep));
+  REQUIRE(got.size() == cuts.size());
+  size_t truncated = 0;
+  for (size_t i = 0; i < cuts.size(); ++i) {
+    const Message& m = all[cuts[i].message];
+    const size_t n = cuts[i].size;
+    Expectation e = m.expect(n);
+    truncated += e.experts.count("truncated");
+    if (captured && n < m.bytes.size()) {
+      // Whether the message was long enough cannot be told.
+      e.experts.erase("truncated");
+      e.experts.erase("length");
+      e.experts.insert("cut");
+      e.fields.erase(std::remove_if(e.fields.begin(), e.fields.end(),
+                                    [](const Field& f) {
+                                      return f.name == "psweep.write.pairs" || f.name == "psweep.write.first_pair";
+                                    }),
+                     e.fields.end());
+    }
+    expect_alone(e, m, n);
+    check_frame(got[i], e, Bytes(m.bytes.begin(), m.bytes.begin() + static_cast<long>(n)), m.what);
+  }
+  CHECK(truncated > 500);
+}
+
+namespace {
+
+// A conversation written by hand.
+class Script {
+ public:
+  struct Want {
+    long request_in = 0, response_in = 0, repeats = 0;
+    std::multiset<std::string> experts;
+    std::string info;
+  };
+  Trace trace;
+  std::map<long, Want> wanted;  // frames not in here are not looked at
+  uint32_t token = 0xcafe0001;
+  net::Address host = host_port(40000), chip = kChip;
+
+  long ask(uint8_t type, uint16_t sequence, uint16_t tile, uint16_t index, const Bytes& payload, uint8_t flags = 0) {
+    return send(host, chip, type, sequence, flags, tile, index, payload);
+  }
+  long answer(uint8_t type, uint16_t sequence, uint8_t code, uint16_t tile = 0, uint16_t index = 0) {
+    return send(chip, host, static_cast<uint8_t>(type | net::kReply), sequence, code, tile, index,
+                Bytes(4 * net::kStatusWords, 0));
+  }
+  long map(uint16_t sequence, uint16_t tile, uint16_t index) {
+    return send(chip, host, net::kMap, sequence, net::kOk, tile, index, Bytes(8, 0));
+  }
+  Want& want(long frame) { return wanted[frame]; }
+  // A request and its reply; of those that were sent already, or now one after the other.
+  void exchange(uint8_t type, uint16_t sequence, const Bytes& payload = {}) {
+    const long request = ask(type, sequence, 0, 0, payload);
+    pair(request, answer(type, sequence, net::kOk));
+  }
+  void pair(long request, long reply) {
+    wanted[request].response_in = reply;
+    wanted[reply].request_in = request;
+  }
+
+  void check(const TemporaryDir& dir, bool two_passes, const std::string& options = "") {
+    const auto got = Tshark(dir).dissect(trace.write(dir), options, two_passes);
+    REQUIRE(got.size() == static_cast<size_t>(trace.frames()));
+    for (const auto& [frame, want] : wanted) {
+      const Dissection& g = got[static_cast<size_t>(frame) - 1];
+      INFO("frame " << frame << ": " << g.info << (two_passes ? "" : ", one pass"));
+      auto text = [](long number) { return number == 0 ? std::string() : std::to_string(number); };
+      CHECK(g.show("psweep.request_in") == text(want.request_in));
+      CHECK(g.show("psweep.repeats") == text(want.repeats));
+      std::string time;
+      if (want.request_in != 0) {
+        const chip::Time t = Trace::time(frame) - Trace::time(want.request_in);
+        char digits[32];
+        std::snprintf(digits, sizeof digits, "0.%09d", static_cast<int>(t / chip::kNanosecond));
+        time = digits;
+      }
+      CHECK(g.show("psweep.response_time") == time);
+      if (!want.info.empty()) CHECK(g.info == want.info);
+      std::multiset<std::string> experts = want.experts;
+      if (two_passes) {
+        CHECK(g.show("psweep.response_in") == text(want.response_in));
+      } else {
+        experts.erase("no_response");  // not known yet
+      }
+      CHECK(std::multiset<std::string>(g.experts.begin(), g.experts.end()) == experts);
+    }
+  }
+
+ private:
+  long send(const net::Address& from, const net::Address& to, uint8_t type, uint16_t sequence, uint8_t flags,
+            uint16_t tile, uint16_t index, const Bytes& payload) {
+    net::Header h;
+    h.type = type;
+    h.token = token;
+    h.sequence = sequence;
+    h.flags = flags;
+    h.tile = tile;
+    h.index = index;
+    Bytes b = net::encode(h);
+    b.insert(b.end(), payload.begin(), payload.end());
+    const long frame = trace.add(from, to, b);
+    wanted[frame];
+    return frame;
+  }
+};
+
+Bytes number(uint32_t v) {
+  Bytes b;
+  net::append32(b, v);
+  return b;
+}
+Bytes start_bytes(uint32_t threshold = 0) {
+  golden::TileJob job;
+  job.tile_cols = 16, job.tile_rows = 12, job.win_cols = 36, job.win_rows = 26, job.planes = 12;
+  job.threshold = static_cast<int>(threshold);
+  return net::start_payload(net::ArbiterConfig{}, job, 1);
+}
+
+}  // namespace
+
+TEST_CASE("dissector: replies find their requests, repetitions the first of them") {
+  if (skipped()) return;
+  TemporaryDir dir;
+  Script s;
+  const uint16_t tile = 3;
+  auto repeated = [&](long frame, long first, const char* expert) {
+    s.want(frame).repeats = first;
+    s.want(frame).experts.insert(expert);
+  };
+  auto unanswered = [&](long frame) { s.want(frame).experts.insert("no_response"); };
+
+  const long open = s.ask(net::kOpen, 1, 0, 0, number(5));
+  s.want(open).info = "OPEN nonce 0x00000005";
+  s.pair(open, s.answer(net::kOpen, 1, net::kOk));
+  const long open_again = s.ask(net::kOpen, 2, 0, 0, number(5));
+  repeated(open_again, open, "repeated");
+  s.pair(open_again, s.answer(net::kOpen, 2, net::kOk));
+  unanswered(s.ask(net::kOpen, 3, 0, 0, number(6)));  // another nonce is another request
+
+  // STATUS is asked all the time; it is repeated where the one before is still open.
+  s.exchange(net::kStatus, 4);
+  const long first_status = s.ask(net::kStatus, 5, 0, 0, {});
+  const long second_status = s.ask(net::kStatus, 6, 0, 0, {});
+  repeated(second_status, first_status, "repeated");
+  s.want(second_status).info = "STATUS [repeated]";
+  s.pair(second_status, s.answer(net::kStatus, 6, net::kOk));
+  s.pair(first_status, s.answer(net::kStatus, 5, net::kOk));  // overtaken
+
+  const long start = s.ask(net::kStart, 7, tile, 0, start_bytes());
+  s.want(start).info = "START tile 3 table 1: 16x12 cells, window 36x26 in 2 chunks, 12 planes";
+  const long not_ready = s.answer(net::kStart, 7, net::kNotReady, tile);
+  s.pair(start, not_ready);
+  s.want(not_ready).experts.insert("code");
+  s.want(not_ready).info = "START not ready: no session";
+
+  const long silent = s.ask(net::kWrite, 8, tile, 0, Bytes(8, 1));  // nobody waits for an answer
+  s.want(silent).info = "WRITE tile 3 chunk 0";
+  const long write = s.ask(net::kWrite, 9, tile, 1, Bytes(8, 1), net::kFlagAnswer);
+  s.want(write).info = "WRITE tile 3 chunk 1, answer";
+  // The same packet twice on the wire: both replies belong to the first.
+  repeated(s.ask(net::kWrite, 9, tile, 1, Bytes(8, 1), net::kFlagAnswer), write, "repeated");
+  const long written = s.answer(net::kWrite, 9, net::kOk, tile, 1);
+  s.pair(write, written);
+  const long written_again = s.answer(net::kWrite, 9, net::kOk, tile, 1);
+  s.want(written_again).request_in = write;
+  repeated(written_again, written, "repeated_reply");
+
+  const long read = s.ask(net::kRead, 10, tile, 0, net::read_payload(40, 0));
+  s.want(read).info = "READ tile 3 chunks 0..39 keep 0";
+  s.pair(read, s.answer(net::kRead, 10, net::kOk, tile));
+  s.want(s.map(10, tile, 0)).request_in = read;
+  const long chunk = s.map(10, tile, 1);
+  s.want(chunk).request_in = read;
+  s.want(chunk).info = "MAP tile 3 chunk 1: 8 bytes";
+  const long chunk_again = s.map(10, tile, 1);
+  s.want(chunk_again).request_in = read;
+  repeated(chunk_again, chunk, "repeated_chunk");
+  const long rest = s.ask(net::kRead, 11, tile, 2, net::read_payload(38, 0));
+  unanswered(rest);
+  s.want(s.map(11, tile, 2)).request_in = rest;
+  const long rest_again = s.ask(net::kRead, 12, tile, 2, net::read_payload(8, 0));
+  repeated(rest_again, rest, "repeated");
+  s.pair(rest_again, s.answer(net::kRead, 12, net::kOk, tile, 2));
+
+  const long release = s.ask(net::kRelease, 13, tile, 0, {});
+  s.pair(release, s.answer(net::kRelease, 13, net::kOk, tile));
+  const long release_again = s.ask(net::kRelease, 14, tile, 0, {});
+  repeated(release_again, release, "repeated");
+  const long refused = s.answer(net::kRelease, 14, net::kOrder, tile);
+  s.pair(release_again, refused);
+  s.want(refused).experts.insert("code");
+
+  const long half = s.ask(net::kSet, 15, 0, 0, number(net::kDuplexHalf));
+  s.want(half).info = "SET duplex half";
+  s.pair(half, s.answer(net::kSet, 15, net::kOk));
+  const long full = s.ask(net::kSet, 16, 0, 0, number(net::kDuplexFull));  // another value
+  s.pair(full, s.answer(net::kSet, 16, net::kOk));
+  const long full_again = s.ask(net::kSet, 17, 0, 0, number(net::kDuplexFull));
+  repeated(full_again, full, "repeated");
+  unanswered(full_again);
+
+  // Answers to nobody: no such sequence, another type, a map packet to what was no READ.
+  for (const long frame :
+       {s.answer(net::kStatus, 99, net::kOk), s.answer(net::kStatus, 16, net::kOk), s.map(13, tile, 9)})
+    s.want(frame).experts.insert("no_request");
+
+  // A packet doubled on the wire, of those that are asked all the time.
+  const long info = s.ask(net::kInfo, 20, 0, 0, {});
+  repeated(s.ask(net::kInfo, 20, 0, 0, {}), info, "repeated");
+  const long told = s.answer(net::kInfo, 20, net::kBadMessage);
+  s.pair(info, told);
+  s.want(told).experts.insert("code");
+  const long later = s.ask(net::kInfo, 21, 0, 0, {});
+  const long told_later = s.answer(net::kInfo, 21, net::kBadMessage);
+  s.pair(later, told_later);
+  s.want(told_later).experts.insert("code");
+
+  // Another session, another host: the same numbers are other requests.
+  s.token = 0xcafe0002;
+  unanswered(s.ask(net::kStart, 30, tile, 0, start_bytes()));
+  s.token = 0xcafe0001;
+  s.host = host_port(40001);
+  const long other = s.ask(net::kStart, 7, tile, 0, start_bytes());
+  s.pair(other, s.answer(net::kStart, 7, net::kOk, tile));
+  s.want(other + 1).info = "START ok: no session";
+  s.host = host_port(40000);
+  // Half of all tile numbers later this one is new.
+  unanswered(s.ask(net::kStart, 31, tile + 32768, 0, start_bytes()));
+  unanswered(s.ask(net::kStart, 32, tile, 0, start_bytes()));
+
+  // Long after it, the same number is another request, not the same packet twice.
+  const long early = s.ask(net::kSet, 40, 0, 0, number(net::kDuplexByPin));
+  s.pair(early, s.answer(net::kSet, 40, net::kOk));
+  for (uint16_t i = 0; i < 300; ++i) s.ask(net::kWrite, 1000 + i, tile, 1000 + i, {0});
+  const long late = s.ask(net::kSet, 40, 0, 0, number(net::kDuplexByPin));
+  repeated(late, early, "repeated");
+  s.pair(late, s.answer(net::kSet, 40, net::kOk));
+
+  s.check(dir, true);
+  s.check(dir, true, "-Y psweep");
+  s.check(dir, false);
+}
+
+TEST_CASE("dissector: random and mutated messages raise no error, and headers stay what they are") {
+  if (skipped()) return;
+  Random random(test_seed());
+  TemporaryDir dir;
+  Trace trace;
+  std::vector<Bytes> sent;
+  std::vector<Message> seeds;
+  const net::ArbiterConfig config = random_config(random);
+  for (const Layout& layout : {Layout(config), Layout()})
+    for (Message& m : messages_of_all_kinds(random, layout, true)) seeds.push_back(std::move(m));
+  for (int i = 0; i < 2500; ++i) {
+    const Message& m = seeds[static_cast<size_t>(random.between(0, static_cast<int>(seeds.size()) - 1))];
+    Bytes b = m.bytes;
+    if (random.between(0, 9) == 0) b = random.bytes(random.between(2, 200));
+    for (int flips = random.between(0, 8); flips > 0; --flips)
+      b[random.bits(31) % b.size()] ^= static_cast<uint8_t>(1 << random.bits(3));
+    if (random.between(0, 3) == 0) b.resize(static_cast<size_t>(random.between(2, static_cast<int>(b.size()) + 9)));
+    net::put16(b, 0, net::kMagic);
+    // All of them in two conversations, so that what spans packets gets its share.
+    const net::Address chip = chip_at(0x0a050002 + random.bits(1));
+    if (m.request) {
+      trace.add(kHost, chip, b);
+    } else {
+      trace.add(chip, kHost, b);
+    }
+    sent.push_back(std::move(b));
+  }
+  const auto got = Tshark(dir).dissect(trace.write(dir));
+  REQUIRE(got.size() == sent.size());
+  for (size_t i = 0; i < got.size(); ++i) {
+    const Bytes& b = sent[i];
+    INFO("frame " << i + 1 << ": " << got[i].info);
+    REQUIRE(got[i].psweep);
+    check_bytes(got[i], b);
+    CHECK(got[i].expert("truncated") >= (b.size() < net::kHeaderBytes));
+    if (b.size() < net::kHeaderBytes) continue;
+    CHECK(got[i].show("psweep.type") == std::to_string(b[3]));
+    CHECK(got[i].show("psweep.sequence") == std::to_string(net::get16(b, 8)));
+    CHECK(got[i].show("psweep.index") == std::to_string(net::get16(b, 14)));
+    CHECK(got[i].expert("version") == (b[2] != net::kVersion));
+  }
+}
+
+TEST_CASE("dissector: other bytes on its port, its messages on other ports, and in ICMP errors") {
+  if (skipped()) return;
+  TemporaryDir dir;
+  net::Header h;
+  h.type = net::kStatus;
+  h.token = 0xcafe0001;
+  const Bytes request = net::encode(h);
+  auto changed = [&](size_t at, uint8_t value) {
+    Bytes b = request;
+    b[at] = value;
+    return b;
+  };
+  Trace trace;
+  std::vector<bool> shown, with_preference;
+  auto add = [&](const net::Address& from, const net::Address& to, const Bytes& b, bool is, bool is_with_preference) {
+    trace.add(from, to, b);
+    shown.push_back(is);
+    with_preference.push_back(is_with_preference);
+  };
+  // On the chip's port: what begins with the magic.
+  add(kHost, kChip, request, true, true);
+  add(kHost, kChip, changed(0, 'Q'), false, false);
+  add(kHost, kChip, changed(1, 's'), false, false);
+  add(kHost, kChip, {'P'}, false, false);
+  add(kHost, kChip, {'P', 'S'}, true, false);
+  add(kHost, kChip, changed(2, 9), true, false);
+  // Elsewhere: whole headers that make sense.
+  const net::Address chip = chip_at(kChip.ip, 30123);
+  Bytes reply = changed(3, net::kStatus | net::kReply);
+  add(kHost, chip, request, true, true);
+  add(chip, kHost, reply, true, true);
+  add(kHost, chip, {'P', 'S'}, false, true);
+  add(kHost, chip, Bytes(request.begin(), request.end() - 1), false, true);
+  add(kHost, chip, changed(2, 9), false, true);
+  add(kHost, chip, changed(3, 0x0c), false, true);
+  reply[10] = 6;
+  add(chip, kHost, reply, false, true);
+  reply[10] = 5;
+  reply[11] = 1;
+  add(chip, kHost, reply, false, true);
+  const auto pcap = trace.write(dir);
+  for (const bool preference : {false, true}) {
+    const auto got = Tshark(dir).dissect(pcap, preference ? "-o psweep.port:30123" : "");
+    REQUIRE(got.size() == shown.size());
+    for (size_t i = 0; i < got.size(); ++i) {
+      INFO("frame " << i + 1 << ", preference " << preference);
+      CHECK(got[i].psweep == (preference ? with_preference[i] : shown[i]));
+    }
+    // Who asks and who answers shows on either port.
+    CHECK(got[6].find("psweep.flags") != nullptr);
+    CHECK(got[7].show("psweep.request_in") == "7");
+  }
+
+  // A request that came back as unreachable is neither a request nor a repetition.
+  Script s;
+  const long first = s.ask(net::kRelease, 1, 0, 0, {});
+  const Bytes original = net::make_udp(s.host, s.chip, net::encode(h));
+  Bytes error = {3, 3, 0, 0, 0, 0, 0, 0};
+  error.insert(error.end(), original.begin() + 14, original.end());
+  net::put16(error, 2, net::internet_checksum(error.data(), error.size()));
+  const long quote = s.trace.add_frame(net::make_ip(s.chip, s.host, net::kProtocolIcmp, error));
+  s.pair(first, s.answer(net::kRelease, 1, net::kOk));
+  s.exchange(net::kStatus, 0);
+  s.check(dir, true);
+  const auto got = Tshark(dir).dissect(s.trace.write(dir));
+  CHECK(got[static_cast<size_t>(quote) - 1].psweep);
 }
