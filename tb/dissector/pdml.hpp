@@ -6,8 +6,11 @@
 //   `raw` are the bytes that tshark took for it, in hex, where it says so.
 // Errors: run() throws std::runtime_error, with tshark's words, if tshark fails or the script has an error.
 #pragma once
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -15,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "chip/pcap.hpp"
 #include "support/temporary_dir.hpp"
 
 namespace psweep::tb {
@@ -54,17 +58,36 @@ constexpr long kPayload = 42;  // Ethernet, IPv4, UDP
 
 class Tshark {
  public:
-  static bool installed() { return std::system("command -v tshark > /dev/null 2>&1") == 0; }
+  // dir: a fresh one; tshark finds no preferences and plugins of whoever runs this, and the dissector is copied there.
+  explicit Tshark(const TemporaryDir& dir) : dir_(dir) {
+    namespace fs = std::filesystem;
+    // Wireshark 4.4 runs no scripts for root, so root becomes nobody, who has to be able to read what is in there.
+    fs::permissions(dir.path(), fs::perms(0755));
+    fs::copy_file(PSWEEP_DISSECTOR, script(), fs::copy_options::overwrite_existing);
+    fs::permissions(script(), fs::perms(0644));
+    const std::string nobody = "setpriv --reuid=65534 --regid=65534 --clear-groups ";
+    if (geteuid() == 0 && std::system((nobody + "true > /dev/null 2>&1").c_str()) == 0) as_ = nobody;
+  }
 
-  explicit Tshark(const TemporaryDir& dir) : dir_(dir) {}
+  // Why there is nothing to be tested here; empty if there is. Whether this script is good makes no difference.
+  std::string obstacle() {
+    if (std::system("command -v tshark > /dev/null 2>&1") != 0) return "tshark is not installed";
+    // A protocol's name is a filter, and tshark refuses one that it does not know.
+    const std::string probe = (dir_ / "probe.lua").string(), empty = (dir_ / "probe.pcap").string();
+    std::ofstream(probe) << "Proto('psweep_probe', 'psweep probe')\n";
+    chip::PcapWriter(empty).close();
+    const std::string command =
+        environment() + "tshark -X 'lua_script:" + probe + "' -r '" + empty + "' -Y psweep_probe > /dev/null 2>&1";
+    if (std::system(command.c_str()) != 0) return "this tshark runs no Lua scripts, or not for this user";
+    return "";
+  }
 
   // Output of tshark with these options. Only in two passes requests know their replies.
   std::string run(const std::string& pcap, const std::string& options, bool two_passes = true) {
     const std::string out = (dir_ / "tshark.out").string(), log = (dir_ / "tshark.log").string();
-    // XDG_CONFIG_HOME: without the preferences and plugins of whoever runs this.
-    const std::string command = "XDG_CONFIG_HOME='" + dir_.path().string() + "' tshark -n " +
-                                (two_passes ? "-2 " : "") + "-X 'lua_script:" + PSWEEP_DISSECTOR + "' -r '" + pcap +
-                                "' " + options + " > '" + out + "' 2> '" + log + "'";
+    const std::string command = environment() + "tshark -n " + (two_passes ? "-2 " : "") +
+                                "-X 'lua_script:" + script() + "' -r '" + pcap + "' " + options + " > '" + out +
+                                "' 2> '" + log + "'";
     const int code = std::system(command.c_str());
     const std::string said = slurp(log);
     if (code != 0 || said.find("Lua") != std::string::npos || said.find(".lua") != std::string::npos)
@@ -83,6 +106,11 @@ class Tshark {
   }
 
  private:
+  std::string script() const { return (dir_ / "psweep.lua").string(); }
+  std::string environment() const {
+    return as_ + "env XDG_CONFIG_HOME='" + dir_.path().string() + "' HOME='" + dir_.path().string() + "' ";
+  }
+
   static std::string slurp(const std::string& file) {
     std::ifstream in(file);
     std::ostringstream text;
@@ -157,6 +185,7 @@ class Tshark {
   }
 
   const TemporaryDir& dir_;
+  std::string as_;
 };
 
 }  // namespace psweep::tb
