@@ -90,6 +90,11 @@ link-speed: setup ## Goodput, latency, busy share of the engine and time of a wh
 	@scripts/build.sh link_speed test_goodput
 	@scripts/link_speed.sh
 
+.PHONY: link-table
+link-table: setup ## RAM of the arbiter's buffers against stall clocks, for bands and tiles, duplex, clocks and lanes
+	@scripts/build.sh link_table
+	@build/link_table
+
 .PHONY: clean
 clean: ## Remove build/
 	rm -rf $(BUILD)
