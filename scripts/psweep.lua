@@ -205,8 +205,8 @@ psweep.experts = e
 local conversations, layouts, frames, addresses = {}, {}, {}, {}
 function psweep.init() conversations, layouts, frames, addresses = {}, {}, {}, {} end
 
--- An address as a number. Not its text, which may turn into a name in the middle of a capture; and not udp.stream, since
--- fields of other protocols can only be read on passes that build a tree.
+-- An address as a number. Not its text, which may turn into a name in the middle of a capture; and not udp.stream,
+-- since fields of other protocols can only be read on passes that build a tree.
 local function number_of(address)
   for number, known in ipairs(addresses) do
     if known == address then return number end
