@@ -12,7 +12,8 @@
 #   analyse    GHDL takes all files of rtl/files.f as VHDL-93, warnings are errors
 #   vhdl       no construct that the conversion to Verilog breaks (lint_text.pl)
 #   units      every entity has a golden model, a test and a page
-#   verilog    Verilator -Wall on the converted engine in every named configuration (scripts/cmake/ghdl_netlist.vlt)
+#   verilog    Verilator -Wall on the converted engine and chip in every named configuration
+#              (scripts/cmake/ghdl_netlist.vlt)
 #   format     clang-format 14 leaves the C++ as it is
 #   shell      shellcheck on the scripts
 #
@@ -69,31 +70,45 @@ check_analyse() {
 check_vhdl() { scripts/lint_text.pl vhdl "${vhdl_files[@]}"; }
 check_units() { scripts/lint_text.pl units "${vhdl_files[@]}"; }
 
-# Keys of a configuration and the generics they become, as in tb/rtl/CMakeLists.txt.
+# Keys of a configuration and the generics they become, as in tb/rtl/CMakeLists.txt and tb/chip/CMakeLists.txt.
+engine_keys=(img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES
+  window:WINDOW pix_bits:PIX_W weight_bits:WEIGHT_W interp_frac:INTERP_F mncc_bits:MNCC_W frac_bits:FRAC_W
+  lanes:LANES)
+arbiter_keys=(clk_khz:CLK_KHZ chunk_bytes:CHUNK_BYTES row_slots:ROW_SLOTS map_depth:MAP_DEPTH rx_slots:RX_SLOTS
+  session_ms:SESSION_MS)
 generics_of() {
-  local pair
-  for pair in img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES \
-    window:WINDOW pix_bits:PIX_W weight_bits:WEIGHT_W interp_frac:INTERP_F mncc_bits:MNCC_W frac_bits:FRAC_W \
-    lanes:LANES; do
-    sed -nE "s/.*\"${pair%:*}\": *([0-9]+).*/-gG_${pair#*:}=\1/p" "$1"
+  local file=$1 pair
+  shift
+  for pair in "$@"; do
+    sed -nE "s/.*\"${pair%:*}\": *([0-9]+).*/-gG_${pair#*:}=\1/p" "$file"
   done
+}
+# verilog_of TOP CONFIGURATION NUMBER GENERIC ..: there must be so many generics.
+verilog_of() {
+  local top=$1 config=$2 number=$3 dir
+  shift 3
+  if [ $# -ne "$number" ]; then echo "$config: found $# of $number generics"; return 1; fi
+  dir=$scratch/$top/$(basename "$config" .json)
+  if cmake -D GHDL=ghdl -D STANDARD=--std=93c -D TOP="$top" -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
+    -D "GENERICS=$(IFS='|'; echo "$*")" -D "DIR=$dir" -P scripts/cmake/VhdlToVerilog.cmake &&
+    verilator --lint-only -Wall --top-module "$top" scripts/cmake/ghdl_netlist.vlt "$dir/$top.v"; then
+    return 0
+  fi
+  echo "$top in $config: see above"
+  return 1
 }
 check_verilog() {
   command -v ghdl > /dev/null || skip "ghdl is not installed" || return
   command -v verilator > /dev/null || skip "verilator is not installed" || return
-  local config name dir bad=0 generics
+  local config engine bad=0 generics
   for config in tb/configs/*.json; do
-    name=$(basename "$config" .json)
-    dir=$scratch/$name
-    mapfile -t generics < <(generics_of "$config")
-    if [ ${#generics[@]} -ne 12 ]; then echo "$config: found ${#generics[@]} of 12 generics"; bad=1; continue; fi
-    if cmake -D GHDL=ghdl -D STANDARD=--std=93c -D TOP=psweep -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
-      -D "GENERICS=$(IFS='|'; echo "${generics[*]}")" -D "DIR=$dir" -P scripts/cmake/VhdlToVerilog.cmake &&
-      verilator --lint-only -Wall --top-module psweep scripts/cmake/ghdl_netlist.vlt "$dir/psweep.v"; then
-      continue
-    fi
-    echo "configuration $name: see above"
-    bad=1
+    mapfile -t generics < <(generics_of "$config" "${engine_keys[@]}")
+    verilog_of psweep "$config" 12 "${generics[@]}" || bad=1
+  done
+  for config in tb/chip/configs/*.json; do
+    engine=tb/configs/$(sed -nE 's/.*"engine": *"([a-z0-9_]+)".*/\1/p' "$config").json
+    mapfile -t generics < <(generics_of "$engine" "${engine_keys[@]}"; generics_of "$config" "${arbiter_keys[@]}")
+    verilog_of psweep_top "$config" 18 "${generics[@]}" || bad=1
   done
   return $bad
 }

@@ -35,7 +35,8 @@ Desk::Desk(std::unique_ptr<ChipModel> chip, const DeskSettings& settings)
       tx_period_(period_of(settings.speed_100 ? 25 : 2.5, settings.tx_ppm)),
       next_clk_(part_of(clk_period_, settings.clk_phase)),
       next_rx_(part_of(rx_period_, settings.rx_phase)),
-      next_tx_(part_of(tx_period_, settings.tx_phase)) {
+      next_tx_(part_of(tx_period_, settings.tx_phase)),
+      mii_clocks_(settings.mii_clocks) {
   if (!(settings.clk_mhz >= 30)) throw InputError("clk: the chip needs 30 MHz or more");
   link_.on_begin = [this](bool from_chip) { frame_begins(from_chip); };
   link_.on_end = [this](bool from_chip, bool good, const net::Bytes& frame) { frame_ends(from_chip, good, frame); };
@@ -106,12 +107,13 @@ void Desk::rx_edge() {
       if (on_frame) on_frame(frame);
     }
   }
-  chip_->rx_edge(link_.rx_clock(), now_);
+  if (mii_clocks_) chip_->rx_edge(link_.rx_clock(), now_);
   if (wave_ && wave_->tile >= 0 && chip_->launches() > wave_->tile) open_wave();
 }
 
 void Desk::tx_edge() {
   next_tx_ += tx_period_;
+  if (!mii_clocks_) return;
   const MiiSample from_chip = chip_->tx_edge(now_);
   // A PHY is reset together with the chip, whose outputs say nothing until then.
   link_.tx_clock(in_reset_ ? MiiSample{} : from_chip);

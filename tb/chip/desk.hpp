@@ -27,6 +27,7 @@ struct DeskSettings {
   double rx_ppm = 0, tx_ppm = 0;  // deviation of the PHY's clocks
   // Phases of the first edges as shares of a period; the values keep edges apart without meaning anything else.
   double clk_phase = 0.13, rx_phase = 0.37, tx_phase = 0.71;
+  bool mii_clocks = true;    // they run from power-on
   bool half_duplex = false;  // pin and medium
   int medium_delay = 10;     // nibble times each way, half duplex: 40 of the 128 of a slot would be the longest
   uint8_t straps = 0;
@@ -67,6 +68,8 @@ class Desk {
   void reset_chip(Time duration = 2 * kMicrosecond);
   // Cable out: frames vanish in both directions, and nothing is counted.
   void set_cable(bool plugged) { plugged_ = plugged; }
+  // Both clocks of the PHY stand still, as some do without a link or in their reset; what is on the wire waits.
+  void set_mii_clocks(bool running) { mii_clocks_ = running; }
   void set_faults(const FaultRates& rates) {
     to_chip_.set_rates(rates);
     from_chip_.set_rates(rates);
@@ -114,7 +117,7 @@ class Desk {
   Time next_clk_, next_rx_, next_tx_;
   Time active_ = 0;  // when something happened last
   int64_t clocks_ = 0;
-  bool plugged_ = true, in_reset_ = false;
+  bool plugged_ = true, in_reset_ = false, mii_clocks_;
   bool carrier_ = false, collision_ = false;
 
   std::unique_ptr<PcapWriter> pcap_;

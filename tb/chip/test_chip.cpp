@@ -300,6 +300,50 @@ TEST_CASE("chip: reset in the middle of a pair") {
   CHECK(b.statistics.sessions == 2);
 }
 
+TEST_CASE("chip: clocks of the PHY stop for a while, in the middle of a pair") {
+  Bench b(chip_named("tiny"));
+  for (int at : {2, 5, 8})
+    for (bool running : {false, true})
+      b.transport.events.push_back({at * kMillisecond + running * 400 * kMicrosecond, [running](Desk& d) {
+                                      d.set_cable(running);
+                                      d.set_mii_clocks(running);
+                                    }});
+  b.run_pair(64, 12);
+  CHECK(b.transport.events.empty());
+  CHECK(b.statistics.sessions == 1);
+}
+
+TEST_CASE("chip: reset while the clocks of the PHY stand still, at power-on and later") {
+  DeskSettings s = settings_for(chip_named("tiny"));
+  s.half_duplex = GENERATE(false, true);
+  s.mii_clocks = false;
+  for (int frames = 0; frames < 5; ++frames) {  // the two slots of the transmitter are left in all states
+    INFO("frames before the reset: " << frames);
+    Bench b(chip_named("tiny"), s);
+    b.desk.run_for(50 * kMicrosecond);
+    b.desk.set_mii_clocks(true);
+    REQUIRE(b.station.resolve(3));
+    for (int i = 1; i < frames; ++i) CHECK(b.station.ping(100));
+    if (frames > 0) {
+      b.desk.set_mii_clocks(false);
+      b.desk.reset_chip();
+      b.desk.run_for(50 * kMicrosecond);
+      b.desk.set_mii_clocks(true);
+    }
+    b.desk.run_for(50 * kMicrosecond);
+    net::Client client(b.transport, 1.0, 1);
+    const auto counters = client.counters();
+    // At power-on the chip has answered ARP; else there was only the question for the counters.
+    for (int i = 0; i < net::kCounterWords; ++i) {
+      INFO("counter " << i);
+      const bool arp = frames == 0 && (i == net::kArp || i == net::kTxFrames || i == net::kRxFrames);
+      const bool question = i == net::kUdp || i == net::kRxFrames;
+      CHECK(counters[static_cast<size_t>(i)] == static_cast<uint32_t>(arp + question));
+    }
+    CHECK(b.desk.link().violations() == 0);
+  }
+}
+
 TEST_CASE("chip: another host is told that the chip is busy, and learns its counters all the same") {
   Bench b(chip_named("tiny"));
   const net::Header first = answer(b.station, request(net::kOpen, 0, {1, 2, 3, 4}));
