@@ -8,9 +8,8 @@
 --              It must not pass a chunk that is being sent
 --   Write    : a cell per clock; empty: ready. complete after s_tlast, then not ready until release_map or clear
 --   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on: chunk f_chunk may be
---              started. A jump takes a clock more for each chunk that the start address walks over: from the chunk
---              after the one sent last if that is not above f_chunk, else from chunk 0. f_chunk may change once
---              f_start has been given
+--              started. A jump takes a clock more for each chunk that the start address walks over: upwards from the
+--              chunk after the one sent last, then from chunk 0. f_chunk may change once f_start has been given
 --   Bytes    : ceil(G_CELL_W/8) per cell, big endian, zeros above the cell, and one idle clock after each cell. f_valid
 --              and f_data hold until f_take
 --   RAM      : ram_deep with columns of nine bits: 31 bits of 32760 cells in 28 blocks
@@ -66,11 +65,13 @@ architecture rtl of map_buffer is
   end function smaller;
 
   constant C_WHOLE      : boolean := G_DEPTH >= G_CELLS;
-  constant C_DEPTH      : integer := smaller(G_DEPTH, G_CELLS);
+  constant C_DEPTH      : integer := imax(2, smaller(G_DEPTH, G_CELLS));
   constant C_ADDR_W     : integer := clog2(C_DEPTH);
   constant C_RING       : integer := G_DEPTH / G_CHUNK_CELLS; -- chunks
   constant C_TURN       : integer := imax(0, C_DEPTH - G_CHUNK_CELLS); -- where the ring's last chunk starts
   constant C_INDEX_W    : integer := clog2(G_CHUNK_CELLS);
+  constant C_COUNT_W    : integer := clog2(G_CELLS + 1);
+  constant C_CHUNK_W    : integer := clog2((G_CELLS + G_CHUNK_CELLS - 1) / G_CHUNK_CELLS + 1);
   constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
 
   -- Write.
@@ -79,20 +80,20 @@ architecture rtl of map_buffer is
   signal room       : std_logic;
   signal busy_q     : std_logic;
   signal complete_q : std_logic;
-  signal count_q    : unsigned(23 downto 0);
+  signal count_q    : unsigned(C_COUNT_W - 1 downto 0);
   signal w_addr     : std_logic_vector(C_ADDR_W - 1 downto 0);
   signal w_index    : unsigned(C_INDEX_W - 1 downto 0); -- in the chunk; stays at the last cell of a complete map
-  signal finished   : unsigned(15 downto 0);            -- chunks, the short last one included
+  signal finished   : unsigned(C_CHUNK_W - 1 downto 0); -- chunks, the short last one included
   signal kept       : unsigned(15 downto 0);            -- the largest keep of this map
 
   -- Read. number and r_addr go together: the chunk and where it starts, but while sending: then r_addr is the cell and
   -- number the next chunk.
   signal exists     : std_logic;
   signal ready_q    : std_logic;
-  signal number     : unsigned(15 downto 0);
+  signal number     : unsigned(C_CHUNK_W - 1 downto 0);
   signal r_addr     : unsigned(C_ADDR_W - 1 downto 0);
   signal number_ok  : std_logic;
-  signal number_far : std_logic;                        -- beyond f_chunk
+  signal number_end : std_logic;                        -- as many as there are
   signal r_index    : unsigned(C_INDEX_W - 1 downto 0);
   signal sending    : std_logic;
   signal last_chunk : std_logic;
@@ -129,7 +130,7 @@ begin
   started  <= fire and not busy_q;
   busy     <= busy_q;
   complete <= complete_q;
-  count    <= std_logic_vector(count_q);
+  count    <= std_logic_vector(resize(count_q, 24));
 
   p_write : process (clk)
   begin
@@ -162,7 +163,7 @@ begin
     room   <= '1';
     kept   <= (others => '0');
     w_addr <= std_logic_vector(count_q(C_ADDR_W - 1 downto 0));
-    exists <= to_bit(unsigned(f_chunk) < finished);
+    exists <= not number_end;
   end generate g_whole;
 
   g_ring : if not C_WHOLE generate
@@ -172,7 +173,7 @@ begin
     used   <= ('0' & finished) - ('0' & kept);
     room   <= used(16) or to_bit(used(15 downto 0) < C_RING);
     w_addr <= std_logic_vector(addr);
-    exists <= to_bit(unsigned(f_chunk) < finished) and to_bit(unsigned(f_chunk) >= kept);
+    exists <= not number_end and to_bit(number >= kept);
 
     p_ring : process (clk)
     begin
@@ -208,8 +209,8 @@ begin
 
   -- Read -------------------------------------------------------------------------------------------------------------
   number_ok  <= to_bit(unsigned(f_chunk) = number);
-  number_far <= to_bit(unsigned(f_chunk) < number);
-  last_chunk <= complete_q and to_bit(number = finished);
+  number_end <= to_bit(number = finished);
+  last_chunk <= complete_q and number_end;
   last_cell  <= to_bit(r_index = G_CHUNK_CELLS - 1) or (last_chunk and to_bit(r_index = w_index));
   last_byte  <= to_bit(byte_n = C_CELL_BYTES - 1);
   load       <= cell_valid and (f_take or not valid_q);
@@ -251,10 +252,10 @@ begin
         r_index    <= (others => '0');
         number     <= number + 1;
       elsif sending = '0' then
-        if number_far = '1' then
+        if number_ok = '0' and number_end = '1' then
           number <= (others => '0');
           r_addr <= (others => '0');
-        elsif number_ok = '0' and exists = '1' then
+        elsif number_ok = '0' then
           number <= number + 1;
           if not C_WHOLE and r_addr = C_TURN then
             r_addr <= (others => '0');

@@ -11,6 +11,7 @@
 #include "Vrow_buffer_5_17_16.h"
 #include "Vrow_buffer_8_5_64.h"
 #include "Vrow_buffer_8_6_70.h"
+#include "Vrow_buffer_8_704_70.h"
 #include "golden/row_buffer.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -38,6 +39,7 @@ struct Rates {
   double clear = 0;         // per clock
   bool sequential = false;  // chunks in order
   double hold = 0;          // b_hold rises, for up to 60 clocks
+  bool largest = false;     // all tiles are as large as can be
 };
 
 // Drives everything and compares in every clock. One tile after the other, of random sizes.
@@ -87,8 +89,8 @@ class Bench : public Agent {
     }
     dut.eval();
     if (!dut.busy && !model.open() && !chance(0.3)) {
-      const int chunks = 1 + static_cast<int>(draw(max_chunks_));
-      const uint32_t spare = draw(shape_.chunk_pairs);
+      const int chunks = rates_.largest ? max_chunks_ : 1 + static_cast<int>(draw(max_chunks_));
+      const uint32_t spare = rates_.largest ? 0 : draw(shape_.chunk_pairs);
       dut.open_tile = 1;
       dut.open_chunks = static_cast<SData>(chunks);
       dut.open_pixels = static_cast<uint32_t>(chunks * shape_.chunk_pairs) - spare;
@@ -323,4 +325,9 @@ TEST_CASE("row_buffer: a pixel per clock from the first to the last") {
   }
   INFO(bench.report());
   CHECK(bench.ok());
+}
+
+TEST_CASE("row_buffer: the sizes of 44-30-13-13 and of 256 x 130 tiles, whole tile and ring") {
+  run_tiles<Vrow_buffer_8_704_70>({8, 704, 70}, {0.0, 0.0, 0.2, 0.0, false, 0.001, true}, 70, 2);
+  run_tiles<Vrow_buffer_8_704_70>({8, 704, 70}, {0.0, 0.1, 0.2, 0.0, false, 0.001, true}, 150, 1);
 }
