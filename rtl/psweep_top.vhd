@@ -2,7 +2,9 @@
 -- psweep_top: the chip: plane-sweep engine, Ethernet arbiter, resets; the pins of an MII PHY (docs/interfaces.md).
 --   Clocks : clk for the engine and the stack, from 30 MHz on; mii_rx_clk and mii_tx_clk from the PHY, 25 or 2.5 MHz.
 --            The three are independent (constraints/)
---   Reset  : arst_n, asynchronous; released in step with each clock
+--   Reset  : arst_n, asynchronous; released in step with each clock, that of clk last: a MAC that clk's side sees fall
+--            into its reset late, because the PHY's clock stood still, would look like a MAC that has sent a frame.
+--            So nothing works before both clocks of the PHY have run; later they may stop and go on
 --   Address: generics; straps are exclusive-ored into the last byte of MAC and IP address
 --   dbg_*  : for waves and tests; leave open
 --   Golden : sw/golden/arbiter.hpp and sw/golden/psweep.hpp
@@ -79,6 +81,7 @@ end entity psweep_top;
 architecture rtl of psweep_top is
 
   signal arst          : std_logic;
+  signal arst_clk      : std_logic;
   signal rst           : std_logic;
   signal rx_rst        : std_logic;
   signal tx_rst        : std_logic;
@@ -124,12 +127,14 @@ begin
   own_ip  <= std_logic_vector(to_unsigned(G_IP_HI, 16))
              & (std_logic_vector(to_unsigned(G_IP_LO, 16)) xor (x"00" & straps));
 
-  arst <= not arst_n;
+  arst     <= not arst_n;
+  -- Free of glitches: each of the three falls once, and arst before the two others.
+  arst_clk <= arst or rx_rst or tx_rst;
 
   u_reset : entity work.reset_sync
     port map (
       clk  => clk,
-      arst => arst,
+      arst => arst_clk,
       rst  => rst
     );
 

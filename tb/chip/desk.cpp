@@ -47,7 +47,7 @@ Desk::Desk(std::unique_ptr<ChipModel> chip, const DeskSettings& settings)
 
 void Desk::reset_chip(Time duration) {
   chip_->set_reset(true);
-  in_reset_ = true;
+  in_reset_ = tx_unknown_ = true;
   run_for(std::max(duration, 10 * std::max(rx_period_, clk_period_)));
   chip_->set_reset(false);
   in_reset_ = false;
@@ -115,8 +115,9 @@ void Desk::tx_edge() {
   next_tx_ += tx_period_;
   if (!mii_clocks_) return;
   const MiiSample from_chip = chip_->tx_edge(now_);
-  // A PHY is reset together with the chip, whose outputs say nothing until then.
-  link_.tx_clock(in_reset_ ? MiiSample{} : from_chip);
+  // A PHY is reset together with the chip, whose outputs say nothing before the first edge that resets them.
+  link_.tx_clock(in_reset_ || tx_unknown_ ? MiiSample{} : from_chip);
+  tx_unknown_ = false;
 }
 
 void Desk::frame_begins(bool from_chip) {

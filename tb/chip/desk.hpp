@@ -117,7 +117,7 @@ class Desk {
   Time next_clk_, next_rx_, next_tx_;
   Time active_ = 0;  // when something happened last
   int64_t clocks_ = 0;
-  bool plugged_ = true, in_reset_ = false, mii_clocks_;
+  bool plugged_ = true, in_reset_ = false, tx_unknown_ = true, mii_clocks_;
   bool carrier_ = false, collision_ = false;
 
   std::unique_ptr<PcapWriter> pcap_;
