@@ -7,13 +7,13 @@
 
 namespace psweep::chip {
 
-const Chip& chip_named(const std::string& name) {
+const Chip& chip_named(std::string_view name) {
   std::string names;
   for (const auto& c : chips()) {
     if (c.name == name) return c;
     names += (names.empty() ? "" : ", ") + c.name;
   }
-  throw InputError("--config: found '" + name + "', expected one of " + names);
+  throw InputError("--config: found '" + std::string(name) + "', expected one of " + names);
 }
 
 net::Address strapped(net::Address address, uint8_t straps) {

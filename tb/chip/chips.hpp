@@ -4,6 +4,7 @@
 #pragma once
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "chip/chip_model.hpp"
@@ -24,7 +25,7 @@ struct Chip {
 // Sorted by name.
 const std::vector<Chip>& chips();
 // Throws InputError, which names those there are.
-const Chip& chip_named(const std::string& name);
+const Chip& chip_named(std::string_view name);
 
 // Straps are exclusive-ored into the last byte of MAC and IP address.
 net::Address strapped(net::Address address, uint8_t straps);
