@@ -9,8 +9,9 @@
 //   while (auto packet = chip.map_packet()) ..     // to chip.map_peer(); call it when the transmitter is free
 //
 // Bytes are exact. Time is not: the engine works in whole chunks and tiles, at clk_khz, one pixel, sample or cell a
-// clock, and map cells come all at once as far as there is room. Tokens are those of the chip only in being new.
-// No I/O, no errors: every payload is legal input.
+// clock, and map cells come all at once as far as there is room. When nothing moves any more (next_event()), the status
+// block is exact, but for tile_clocks of a tile that had to wait or was dropped (clocks_exact()). Tokens are those of
+// the chip only in being new. No I/O, no errors: every payload is legal input.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -25,15 +26,22 @@
 
 namespace psweep::golden {
 
-// Inverse of job_writes(): values of the registers net::kJobRegisters, in their order.
+// Inverse of job_writes(): values of the registers net::kJobRegisters, in their order. Of a bound the engine keeps 13
+// bits, of a step 21 (table_entry()); sizes and threshold must fit.
 inline TileJob job_from_words(const std::array<uint32_t, net::kJobWords>& w) {
   auto s = [&w](size_t i) { return static_cast<int32_t>(w[i]); };
   TileJob t;
   t.tile_cols = s(0), t.tile_rows = s(1), t.win_cols = s(2), t.win_rows = s(3), t.planes = s(4), t.threshold = s(5);
   t.tx_left = s(6), t.ty_left = s(7), t.tx_right = s(8), t.ty_right = s(9);
-  t.left = {s(10), s(11), s(12), s(13)};
-  t.right = {s(14), s(15), s(16), s(17)};
+  auto bound = [&w](size_t i) { return static_cast<int32_t>(w[i] << 19) >> 19; };
+  t.left = {bound(10), bound(11), bound(12), bound(13)};
+  t.right = {bound(14), bound(15), bound(16), bound(17)};
   return t;
+}
+inline PlaneEntry table_entry(const uint32_t* w) {
+  auto s = [w](int i) { return static_cast<int32_t>(w[i]); };
+  const uint32_t step = (1u << 21) - 1;
+  return {s(0), s(1), s(2), s(3), w[4] & step, w[5] & step, w[6] & step, w[7] & step};
 }
 
 class Arbiter {
@@ -69,9 +77,9 @@ class Arbiter {
     counters_ = {};
     duplex_ = 0;
     open_ = false;
-    tiles_done_ = tiles_dropped_ = error_count_ = window_errors_ = 0;
-    errors_ = 0;
     tile_clocks_ = 0;
+    clocks_exact_ = true;
+    run_tile_ = failed_tile_ = 0;
     forget();
   }
 
@@ -90,8 +98,10 @@ class Arbiter {
     now_ = std::max(now_, time);
   }
 
-  // The replies to one UDP payload: none or one.
+  // The replies to one UDP payload: none or one. latest_code(): how it was taken, also of a message without a reply;
+  // nothing: it was none.
   std::vector<Bytes> message(const Bytes& m, uint32_t peer) {
+    latest_code_.reset();
     if (m.size() < net::kHeaderBytes || net::get16(m, 0) != net::kMagic) {
       ++counters_[net::kBadMessages];
       return {};
@@ -105,6 +115,7 @@ class Arbiter {
     h.index = static_cast<uint16_t>(net::get16(m, 14));
     bool silent = false;
     const net::Code code = obey(m, h, peer, silent);
+    latest_code_ = code;
     advance(now_);  // what became possible at once
     if (silent) return {};
     net::Header reply = h;
@@ -144,13 +155,35 @@ class Arbiter {
     return out;
   }
   uint32_t map_peer() const { return read_peer_; }
+  std::optional<net::Code> latest_code() const { return latest_code_; }
+
+  // When the engine goes on by itself, in seconds; nothing: not before another message.
+  std::optional<double> next_event() const {
+    if (stage_ == Stage::kLoad || stage_ == Stage::kDrain) {
+      if (!next_chunk_there()) return std::nullopt;
+      return engine_time_ + next_pairs() * clock();
+    }
+    if (stage_ == Stage::kSweep) return engine_time_ + sweep_time();
+    return std::nullopt;
+  }
+  bool sweeping() const { return stage_ == Stage::kSweep; }
+  bool clocks_exact() const { return clocks_exact_; }
+  // The status block as words, not the reply to anybody.
+  std::vector<uint32_t> status() const {
+    Bytes bytes;
+    append_status(bytes);
+    std::vector<uint32_t> words(bytes.size() / 4);
+    for (size_t i = 0; i < words.size(); ++i) words[i] = net::get32(bytes, 4 * i);
+    return words;
+  }
 
   bool session_open() const { return open_; }
+  uint32_t token() const { return token_; }
   uint32_t counter(net::Counter c) const { return counters_[c]; }
   bool full_duplex() const { return duplex_ == net::kDuplexFull || (duplex_ == net::kDuplexByPin && pin_full_); }
 
  private:
-  enum class Stage { kIdle, kLoad, kSweep, kUnload };
+  enum class Stage { kIdle, kLoad, kDrain, kSweep, kUnload };
 
   // Header good; decides and does.
   net::Code obey(const Bytes& m, const net::Header& h, uint32_t peer, bool& silent) {
@@ -203,7 +236,9 @@ class Arbiter {
         read_next_ = h.index;
         read_left_ = static_cast<uint16_t>(net::get16(m, net::kHeaderBytes));
         read_peer_ = peer;
-        if (h.tile == map_tile_) keep_ = static_cast<uint16_t>(net::get16(m, net::kHeaderBytes + 2));
+        if (h.tile == map_tile_ && map_busy_) {
+          keep_ = std::max(keep_, static_cast<uint16_t>(net::get16(m, net::kHeaderBytes + 2)));
+        }
         return net::kOk;
       case net::kRelease:
         if (h.tile != map_tile_) return net::kOrder;
@@ -234,18 +269,15 @@ class Arbiter {
       ++table_id_;
       table_words_.clear();
     }
+    // Words beyond the engine's table are errors there, one each, but are counted as written, up to 8192.
     const size_t most = size_t{8} * config_.engine.planes;
     for (size_t i = 0; i < body / 4; ++i) {
       const uint32_t value = net::get32(m, net::kHeaderBytes + 4 * i);
       const size_t at = h.index + i;
-      if (at >= most) {
-        errors_ |= kErrorAddress;
-        error_count_ = std::min(error_count_ + 1, 0xffffu);
-        break;
-      }
+      if (at >= most) error(kErrorAddress);
       if (at < table_words_.size()) {
         table_words_[at] = value;
-      } else {
+      } else if (table_words_.size() < 8192) {
         table_words_.push_back(value);
       }
     }
@@ -274,7 +306,7 @@ class Arbiter {
     chunks_ = chunks;
     base_ = received_ = 0;
     there_.assign(chunks, false);
-    pairs_.assign(size_t{chunks} * config_.chunk_pairs(), 0);
+    pairs_.clear();
     return net::kOk;
   }
 
@@ -290,7 +322,9 @@ class Arbiter {
       return net::kNotReady;
     }
     const size_t width = config_.pair_bytes(), first = size_t{h.index} * config_.chunk_pairs();
-    for (size_t i = 0; i < static_cast<size_t>(config_.chunk_pairs()); ++i) {
+    const auto pairs = static_cast<size_t>(config_.chunk_pairs());
+    pairs_.resize(std::max(pairs_.size(), first + pairs));
+    for (size_t i = 0; i < pairs; ++i) {
       uint32_t value = 0;
       for (size_t b = 0; b < width; ++b) value = value << 8 | m[net::kHeaderBytes + i * width + b];
       pairs_[first + i] = value;
@@ -302,52 +336,52 @@ class Arbiter {
 
   // Everything that became possible up to this time.
   void advance(double time) {
-    const double clock = 1e-3 / config_.clk_khz;
     for (;;) {
       if (stage_ == Stage::kIdle) {
         if (!staged_ || received_ < std::min<uint32_t>(chunks_, config_.slots())) break;
         staged_ = false;
         run_tile_ = last_tile_;
-        window_errors_ = 0;
         job_ = staged_job_;
-        if (!job_fits()) {
-          fail(kErrorConfig);
-          break;
-        }
-        stage_ = Stage::kLoad;
         engine_time_ = std::max(engine_time_, now_);
-      } else if (stage_ == Stage::kLoad) {
-        const uint32_t needed = (pixels_ + config_.chunk_pairs() - 1) / config_.chunk_pairs();
-        if (base_ < needed) {
-          if (base_ >= chunks_ || !there_[base_]) {
-            wait(net::kEngineWaitRows, rows_wait_, time - engine_time_);
+        stage_ = Stage::kLoad;
+        if (job_fits()) {
+          clocks_exact_ = true;
+        } else {
+          drop(kErrorConfig);
+        }
+      } else if (stage_ == Stage::kLoad || stage_ == Stage::kDrain) {
+        if (base_ < needed_chunks()) {
+          if (!next_chunk_there()) {
+            if (engine_time_ < time && stage_ == Stage::kLoad) clocks_exact_ = false;
             engine_time_ = std::max(engine_time_, time);
             break;
           }
-          const uint32_t pairs =
-              std::min<uint32_t>(config_.chunk_pairs(), pixels_ - base_ * static_cast<uint32_t>(config_.chunk_pairs()));
-          if (engine_time_ + pairs * clock > time) break;
-          engine_time_ += pairs * clock;
+          const double then = engine_time_ + next_pairs() * clock();
+          if (then > time) break;
+          engine_time_ = then;
           ++base_;
+          const uint64_t loaded = uint64_t{base_} * static_cast<uint32_t>(config_.chunk_pairs());
+          if (stage_ == Stage::kLoad && pixels_ > load_clocks(job_) && loaded >= load_clocks(job_)) drop(kErrorLong);
         } else {
           row_busy_ = false;
-          compute();
-          if (stage_ == Stage::kIdle) continue;  // dropped
-          stage_ = Stage::kSweep;
+          if (stage_ == Stage::kLoad && pixels_ < load_clocks(job_)) drop(kErrorShort);
+          if (stage_ == Stage::kDrain) {
+            failed_ = true;
+            failed_tile_ = run_tile_;
+            stage_ = Stage::kIdle;
+          } else {
+            compute();
+            stage_ = Stage::kSweep;
+          }
         }
       } else if (stage_ == Stage::kSweep) {
-        const double sweep =
-            sweep_seconds_ >= 0
-                ? sweep_seconds_
-                : static_cast<double>(sweep_clocks(config_.engine, job_) + fill_clocks(config_.engine)) * clock;
-        if (engine_time_ + sweep > time) break;
-        engine_time_ += sweep;
+        if (engine_time_ + sweep_time() > time) break;
+        engine_time_ += sweep_time();
         stage_ = Stage::kUnload;
       } else {
         if (!map_started_) {
           if (map_busy_) {
-            wait(net::kEngineWaitMap, map_wait_, time - engine_time_);
-            engine_time_ = std::max(engine_time_, time);
+            wait_for_map(time);
             break;
           }
           map_started_ = map_busy_ = true;
@@ -356,13 +390,13 @@ class Arbiter {
           map_count_ = 0;
           keep_ = 0;
         }
-        map_count_ = std::min(map_.size(), depth() >= largest() ? map_.size() : keep_ * chunk_cells() + depth());
+        map_count_ = std::max(map_count_, std::min(map_.size(), whole() ? map_.size() : kept_cells() + depth()));
         if (map_count_ < map_.size()) {
-          wait(net::kEngineWaitMap, map_wait_, time - engine_time_);
-          engine_time_ = std::max(engine_time_, time);
+          wait_for_map(time);
           break;
         }
-        tile_clocks_ = static_cast<uint32_t>(engine_clocks(config_.engine, job_));
+        // The row buffer's first pair comes 3 clocks after the start; the engine could take it after one.
+        tile_clocks_ = static_cast<uint32_t>(engine_clocks(config_.engine, job_)) + 2;
         tiles_done_ = std::min(tiles_done_ + 1, 0xffffu);
         stage_ = Stage::kIdle;
         map_started_ = false;
@@ -373,19 +407,33 @@ class Arbiter {
       engine_time_ = std::max(engine_time_, time);
     }
   }
+  void wait_for_map(double time) {
+    if (engine_time_ < time) clocks_exact_ = false;
+    wait(net::kEngineWaitMap, map_wait_, time - engine_time_);
+    engine_time_ = std::max(engine_time_, time);
+  }
+
+  double clock() const { return 1e-3 / config_.clk_khz; }
+  double sweep_time() const {
+    if (sweep_seconds_ >= 0) return sweep_seconds_;
+    return static_cast<double>(sweep_clocks(config_.engine, job_) + fill_clocks(config_.engine)) * clock();
+  }
+  uint32_t needed_chunks() const { return (pixels_ + config_.chunk_pairs() - 1) / config_.chunk_pairs(); }
+  bool next_chunk_there() const { return base_ >= needed_chunks() || (base_ < chunks_ && there_[base_]); }
+  uint32_t next_pairs() const {
+    const auto per = static_cast<uint32_t>(config_.chunk_pairs());
+    return base_ < needed_chunks() ? std::min(per, pixels_ - base_ * per) : 0;
+  }
 
   bool job_fits() const {
     const Config& c = config_.engine;
     auto in = [](int v, int hi) { return v >= 1 && v <= hi; };
     return in(job_.tile_cols, c.plane_cols) && in(job_.tile_rows, c.plane_rows) && in(job_.win_cols, c.img_cols) &&
-           in(job_.win_rows, c.img_rows) && in(job_.planes, c.planes);
+           in(job_.win_rows, c.img_rows) && in(job_.planes, c.planes) && job_.threshold >= 0 &&
+           job_.threshold < 1 << c.mncc_bits;
   }
 
   void compute() {
-    if (pixels_ != load_clocks(job_)) {
-      fail(pixels_ < load_clocks(job_) ? kErrorShort : kErrorLong);
-      return;
-    }
     Pixels left(job_.win_cols, job_.win_rows), right(job_.win_cols, job_.win_rows);
     const int bits = config_.engine.pix_bits;
     const uint32_t mask = (1u << bits) - 1;
@@ -394,26 +442,25 @@ class Arbiter {
       right.data[i] = static_cast<uint16_t>(pairs_[i] & mask);
     }
     std::vector<PlaneEntry> entries(job_.planes);
-    for (size_t k = 0; k < entries.size(); ++k) {
-      const uint32_t* w = &table_words_[8 * k];
-      auto s = [w](int i) { return static_cast<int32_t>(w[i]); };
-      entries[k] = {s(0), s(1), s(2), s(3), w[4], w[5], w[6], w[7]};
-    }
+    for (size_t k = 0; k < entries.size(); ++k) entries[k] = table_entry(&table_words_[8 * k]);
     result_ = compute_(job_, entries, left, right);
     if (result_.window_errors != 0) {
-      window_errors_ = static_cast<uint32_t>(std::min<uint64_t>(result_.window_errors, 0xffff));
-      errors_ |= kErrorWindow;
-      error_count_ = std::min(error_count_ + 1, 0xffffu);
+      window_errors_ = static_cast<uint32_t>(std::min<uint64_t>(window_errors_ + result_.window_errors, 0xffff));
+      error(kErrorWindow);
     }
   }
 
-  void fail(ErrorBit bit) {
+  void error(ErrorBit bit) {
     errors_ |= bit;
     error_count_ = std::min(error_count_ + 1, 0xffffu);
+  }
+  // The engine takes the rest of the tile's pixels and does nothing with them. A tile refused at its start leaves
+  // tile_clocks as it was.
+  void drop(ErrorBit bit) {
+    error(bit);
     tiles_dropped_ = std::min(tiles_dropped_ + 1, 0xffffu);
-    failed_ = true;
-    failed_tile_ = run_tile_;
-    stage_ = Stage::kIdle;
+    if (bit != kErrorConfig) clocks_exact_ = false;
+    stage_ = Stage::kDrain;
   }
 
   void wait(net::Counter counter, double& rest, double seconds) {
@@ -425,12 +472,14 @@ class Arbiter {
   }
 
   void close() {
-    const bool dropped = stage_ != Stage::kIdle;
+    const bool dropped = stage_ != Stage::kIdle && stage_ != Stage::kDrain;
+    if (dropped) clocks_exact_ = false;
     forget();
     tiles_dropped_ = dropped ? 1 : 0;  // abort and clear in one command: the drop counts
     open_ = false;
   }
-  // What st_abort of the RTL does; the engine's errors and counters are cleared with it.
+  // What st_abort of the RTL does; the engine's errors and counters are cleared with it, but tile_clocks and the
+  // numbers of the tiles launched and failed stay.
   void forget() {
     errors_ = error_count_ = tiles_done_ = tiles_dropped_ = window_errors_ = 0;
     stage_ = Stage::kIdle;
@@ -439,7 +488,6 @@ class Arbiter {
     map_count_ = 0;
     base_ = received_ = chunks_ = pixels_ = 0;
     last_tile_ = map_tile_ = 0xffff;
-    run_tile_ = failed_tile_ = 0;
     table_id_ = 0;
     table_words_.clear();
     read_left_ = 0;
@@ -453,20 +501,23 @@ class Arbiter {
   size_t chunk_cells() const { return static_cast<size_t>(config_.chunk_cells()); }
   size_t largest() const { return static_cast<size_t>(config_.engine.plane_cols) * config_.engine.plane_rows; }
   size_t depth() const {
-    if (config_.map_depth <= 0) return largest();
-    return (config_.map_depth + chunk_cells() - 1) / chunk_cells() * chunk_cells();
+    const size_t asked = static_cast<size_t>(std::max(0, config_.map_depth));
+    if (asked == 0 || asked >= largest()) return largest();
+    return std::max<size_t>(2, (asked + chunk_cells() - 1) / chunk_cells()) * chunk_cells();
   }
+  bool whole() const { return depth() >= largest(); }
+  size_t kept_cells() const { return keep_ * chunk_cells(); }
   bool map_complete() const { return map_busy_ && !map_started_; }
   bool chunk_there(uint16_t c) const {
     const size_t first = c * chunk_cells(), end = first + chunk_cells();
-    if (c < keep_ || first >= map_count_) return false;
-    if (first + depth() < map_count_ && depth() < largest()) return false;  // overwritten
+    if ((!whole() && c < keep_) || first >= map_count_) return false;
     return end <= map_count_ || map_complete();
   }
 
   void append_status(Bytes& out) const {
     using namespace net;
-    const uint32_t state = stage_ == Stage::kIdle ? 0 : stage_ == Stage::kLoad ? 1 : stage_ == Stage::kSweep ? 2 : 4;
+    const State states[] = {State::kIdle, State::kLoad, State::kDrain, State::kSweep, State::kUnload};
+    const auto state = static_cast<uint32_t>(states[static_cast<size_t>(stage_)]);
     auto flag = [](bool on, StatusFlag bit) { return on ? static_cast<uint32_t>(bit) : 0; };
     const uint32_t flags = flag(open_, kFlagSession) | flag(row_busy_, kFlagRows) |
                            flag(stage_ != Stage::kIdle, kFlagEngine) | flag(map_busy_, kFlagMap) |
@@ -544,14 +595,16 @@ class Arbiter {
   bool failed_ = false;
   unsigned errors_ = 0, error_count_ = 0, tiles_done_ = 0, tiles_dropped_ = 0, window_errors_ = 0;
   uint32_t tile_clocks_ = 0;
+  bool clocks_exact_ = true;
   // Map buffer; cells map_[0 .. map_count_-1] have arrived
   bool map_busy_ = false, map_started_ = false;  // started: and not complete
   std::vector<MapCell> map_;
   size_t map_count_ = 0;
-  uint16_t keep_ = 0;
+  uint16_t keep_ = 0;  // the largest one of a READ for this map
   // The READ in force
   uint16_t read_tile_ = 0, read_next_ = 0, read_left_ = 0, read_sequence_ = 0;
   uint32_t read_peer_ = 0;
+  std::optional<net::Code> latest_code_;
 };
 
 }  // namespace psweep::golden

@@ -18,6 +18,7 @@ constexpr double kMostPause = 0.25;                                         // w
 constexpr uint32_t kMergeGap = 4;       // map chunks sent again in vain rather than one more round trip
 constexpr int kMostRefusals = 64;       // of one session, beyond what reordering explains
 constexpr int kMostNowhere = 8;         // status blocks in a row without a trace of a started tile
+constexpr int kMostStill = 64;          // status blocks in a row in which nothing moves, and no tile is swept
 constexpr int kMostFruitlessOpens = 8;  // sessions in a row that brought no tile
 
 class Pump {
@@ -124,7 +125,7 @@ class Pump {
     errors_ = s.errors;
     error_count_ = s.error_count;
     set_duplex(s);
-    refusals_ = nowhere_ = 0;
+    refusals_ = nowhere_ = still_ = 0;
     first_ = next_ = wanted_;
     upload_ = Upload{};
     upload_active_ = false;
@@ -157,7 +158,7 @@ class Pump {
       prepare();
       send_start();
     }
-    if (upload_active_ && upload_.started) send_rows();
+    if (upload_active_ && upload_.started && !upload_.done()) send_rows();
   }
 
   void prepare() {
@@ -375,7 +376,16 @@ class Pump {
     const bool nowhere =
         it != downloads_.end() && !releasing_ && !s.has(kFlagRows) && !s.has(kFlagEngine) && !s.has(kFlagMap);
     nowhere_ = nowhere ? nowhere_ + 1 : 0;
-    if (nowhere_ > kMostNowhere) lost_session_ = true;
+    // Nor does it go on if this side takes for done what is not: no chip says so, but one wrong packet is enough.
+    const std::array<uint32_t, 8> look = {
+        s.row_tile, s.flags,    s.engine_tile, s.map_tile,
+        s.base,     s.received, s.cells,       it != downloads_.end() ? it->second.known : 0};
+    const int engine = s.flags >> 8 & 7;
+    const bool sweeping =
+        engine == static_cast<int>(golden::State::kSweep) || engine == static_cast<int>(golden::State::kFlush);
+    still_ = look == look_ && !sweeping ? still_ + 1 : 0;
+    look_ = look;
+    if (nowhere_ > kMostNowhere || still_ > kMostStill) lost_session_ = true;
     if (it != downloads_.end() && s.has(kFlagMap) && s.map_tile == number(wanted_)) {
       Download& d = it->second;
       if (s.has(kFlagMapComplete) && !d.checked) {
@@ -495,7 +505,8 @@ class Pump {
 
   // Tiles: wanted_ <= next_; below wanted_ all received, below next_ all started. first_ is tile 0 of the session.
   int wanted_ = 0, next_ = 0, first_ = 0;
-  int wanted_at_open_ = 0, fruitless_ = 0, refusals_ = 0, nowhere_ = 0;
+  int wanted_at_open_ = 0, fruitless_ = 0, refusals_ = 0, nowhere_ = 0, still_ = 0;
+  std::array<uint32_t, 8> look_{};  // of the latest status block
   bool lost_session_ = false;
   bool half_duplex_ = false;
   unsigned errors_ = 0, error_count_ = 0;  // at OPEN
