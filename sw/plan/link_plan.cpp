@@ -132,7 +132,7 @@ class Wire {
       e.attempts = std::min(e.attempts + 1, golden::kAttempts - 1);
       e.backing_off = true;
       const auto slots = static_cast<Time>(random_() % (1u << std::min(e.attempts, golden::kBackoffLimit)));
-      agenda_.after(over + slots * kSlot, [this, side] {
+      agenda_.after(over + kGap + slots * kSlot, [this, side] {
         end_[side].backing_off = false;
         contend(side);
       });
