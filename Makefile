@@ -95,6 +95,11 @@ link-table: setup ## RAM of the arbiter's buffers against stall clocks, for band
 	@scripts/build.sh link_table
 	@build/link_table
 
+.PHONY: fuzz
+fuzz: setup ## Random and mutated frames into the simulated chips, packets into the host   FRAMES=100000 SEED=n
+	@scripts/build.sh test_fuzz test_net_fuzz
+	@scripts/fuzz.sh $(FRAMES)
+
 .PHONY: clean
 clean: ## Remove build/
 	rm -rf $(BUILD)

@@ -209,6 +209,7 @@ architecture rtl of arbiter is
   signal frame_rdata    : std_logic_vector(7 downto 0);
   signal row_complete   : std_logic;
   signal go             : std_logic;
+  signal map_valid      : std_logic;
   signal map_last       : std_logic;
   signal map_ready      : std_logic;
   signal map_cell       : std_logic_vector(C_CELL_W - 1 downto 0);
@@ -605,7 +606,7 @@ begin
     port map (
       clk         => clk,
       rst         => rst,
-      s_tvalid    => s_map_tvalid,
+      s_tvalid    => map_valid,
       s_tready    => map_ready,
       s_tdata     => map_cell,
       s_tlast     => s_map_tlast,
@@ -627,7 +628,9 @@ begin
 
   -- The mask's other bits follow from the fields (docs/protocol.md).
   map_cell     <= s_map_tdata(s_map_tdata'high) & s_map_tdata(C_CELL_W - 2 downto 0);
-  s_map_tready <= map_ready;
+  -- When the buffer has been emptied at the end of a session the engine may still offer a cell: it is not taken.
+  s_map_tready <= map_ready and running;
+  map_valid    <= s_map_tvalid and running;
   map_last     <= s_map_tvalid and map_ready and s_map_tlast;
   engine_wait  <= s_map_tvalid and not map_ready;
 

@@ -588,7 +588,7 @@ begin
           elsif hpos = C_HEADER + 7 then
             token_ok <= open_q and to_bit(word_next = token);
           elsif hpos = C_HEADER + 9 then
-            if msg_type = C_READ and token_ok = '1' then
+            if msg_type = C_READ and token_ok = '1' and magic_ok = '1' and version_ok = '1' and long_1 = '1' then
               read_seq <= word_next(15 downto 0);
             end if;
           elsif hpos = C_HEADER + 10 then
