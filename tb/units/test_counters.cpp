@@ -31,9 +31,9 @@ class Bench : public Agent {
     restart();
   }
   // Resets, and waits for the end of the first scan.
-  void restart() {
+  void restart(int reset_clocks = 4) {
     quiet = true;
-    sim.reset();
+    sim.reset(reset_clocks);
     model = golden::Counters(count_);
     for (auto& p : pulses_) p.clear();
     for (auto& n : next_) n = 0;
@@ -141,8 +141,12 @@ void run_all(int count) {
     bench.sim.run(40 * bench.model.spacing() + 1000);
     bench.read_all();
   }
-  bench.restart();
-  bench.read_all();  // zeros again
+  for (int i = 0; i < 16; ++i) {  // in all phases of the scanner, by short resets
+    bench.quiet = false;
+    bench.sim.run(3 * bench.model.spacing() + static_cast<uint64_t>(i));
+    bench.restart(1 + i / 4);
+    bench.read_all();  // zeros again
+  }
   bench.quiet = false;
   bench.sim.run(10 * bench.model.spacing());
   bench.read_all();

@@ -58,6 +58,7 @@ class Bench : public Agent {
       dut.tile = static_cast<SData>(random_());
     }
     if (!dut.staged) {
+      dut.complete = chance(0.5);  // means nothing
       if (!model.running() && !engine_busy_ && !stop_due_ && chance(table_rate_)) {
         dut.t_valid = 1;
         return;
