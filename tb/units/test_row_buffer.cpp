@@ -83,8 +83,14 @@ class Bench : public Agent {
     dut.b_index = static_cast<SData>(chance(0.9) ? draw(shape_.slots) : random_() & 0x3ff);
     if (chance(rates_.clear)) {
       dut.clear = 1;
+      late_ = writing_;
       writing_ = false;
       wait_ = 0;
+      return;
+    }
+    if (late_ && !model.open() && chance(0.05)) {  // the commit of a chunk that clear has taken back: nothing happens
+      dut.w_commit = 1;
+      late_ = false;
       return;
     }
     dut.eval();
@@ -92,6 +98,7 @@ class Bench : public Agent {
       const int chunks = rates_.largest ? max_chunks_ : 1 + static_cast<int>(draw(max_chunks_));
       const uint32_t spare = rates_.largest ? 0 : draw(shape_.chunk_pairs);
       dut.open_tile = 1;
+      late_ = false;
       dut.open_chunks = static_cast<SData>(chunks);
       dut.open_pixels = static_cast<uint32_t>(chunks * shape_.chunk_pairs) - spare;
       wait_ = 2;
@@ -133,7 +140,7 @@ class Bench : public Agent {
     sample_answer(now);
     sample_output(now);
 
-    if (dut.w_commit) model.store(chunk_, data_);
+    if (dut.w_commit && model.open()) model.store(chunk_, data_);
     if (dut.go) {
       gone_ = true;
       go_clock = now;
@@ -275,6 +282,7 @@ class Bench : public Agent {
   uint64_t held_data_ = 0, quiet_from_ = 0, answer_due_ = ~uint64_t{0};
   Answer answer_ = Answer::kRefused;
   size_t sent_ = 0;
+  bool late_ = false;
   std::vector<uint8_t> data_;
   std::deque<Asked> history_;
 };
