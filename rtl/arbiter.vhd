@@ -211,6 +211,7 @@ architecture rtl of arbiter is
   signal go             : std_logic;
   signal map_valid      : std_logic;
   signal map_last       : std_logic;
+  signal done_clocks    : std_logic_vector(31 downto 0); -- tile_clocks of the tile whose map is in the buffer
   signal map_ready      : std_logic;
   signal map_cell       : std_logic_vector(C_CELL_W - 1 downto 0);
 
@@ -396,7 +397,7 @@ begin
       tiles_done      => tiles_done,
       tiles_dropped   => tiles_dropped,
       window_errors   => window_errors,
-      tile_clocks     => tile_clocks
+      tile_clocks     => done_clocks
     );
 
   u_counters : entity work.counters
@@ -633,5 +634,18 @@ begin
   map_valid    <= s_map_tvalid and running;
   map_last     <= s_map_tvalid and map_ready and s_map_tlast;
   engine_wait  <= s_map_tvalid and not map_ready;
+
+  -- The engine counts the next tile as soon as that is launched, perhaps before the host asks for this one's clocks.
+  p_clocks : process (clk)
+  begin
+    if rising_edge(clk) then
+      if map_last = '1' and running = '1' then
+        done_clocks <= tile_clocks;
+      end if;
+      if rst = '1' then
+        done_clocks <= (others => '0');
+      end if;
+    end if;
+  end process p_clocks;
 
 end architecture rtl;

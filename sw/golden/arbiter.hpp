@@ -10,7 +10,7 @@
 //
 // Bytes are exact. Time is not: the engine works in whole chunks and tiles, at clk_khz, one pixel, sample or cell a
 // clock, and map cells come all at once as far as there is room. When nothing moves any more (next_event()), the status
-// block is exact, but for tile_clocks of a tile that had to wait or was dropped (clocks_exact()). Tokens are those of
+// block is exact, but for tile_clocks of a tile that had to wait (clocks_exact()). Tokens are those of
 // the chip only in being new. No I/O, no errors: every payload is legal input.
 #pragma once
 #include <algorithm>
@@ -78,7 +78,7 @@ class Arbiter {
     duplex_ = 0;
     open_ = false;
     tile_clocks_ = 0;
-    clocks_exact_ = true;
+    clocks_exact_ = shown_exact_ = true;
     run_tile_ = failed_tile_ = 0;
     forget();
   }
@@ -167,7 +167,7 @@ class Arbiter {
     return std::nullopt;
   }
   bool sweeping() const { return stage_ == Stage::kSweep; }
-  bool clocks_exact() const { return clocks_exact_; }
+  bool clocks_exact() const { return shown_exact_; }
   // The status block as words, not the reply to anybody.
   std::vector<uint32_t> status() const {
     Bytes bytes;
@@ -397,6 +397,7 @@ class Arbiter {
         }
         // The row buffer's first pair comes 3 clocks after the start; the engine could take it after one.
         tile_clocks_ = static_cast<uint32_t>(engine_clocks(config_.engine, job_)) + 2;
+        shown_exact_ = clocks_exact_;
         tiles_done_ = std::min(tiles_done_ + 1, 0xffffu);
         stage_ = Stage::kIdle;
         map_started_ = false;
@@ -454,12 +455,10 @@ class Arbiter {
     errors_ |= bit;
     error_count_ = std::min(error_count_ + 1, 0xffffu);
   }
-  // The engine takes the rest of the tile's pixels and does nothing with them. A tile refused at its start leaves
-  // tile_clocks as it was.
+  // The engine takes the rest of the tile's pixels and does nothing with them; tile_clocks stays.
   void drop(ErrorBit bit) {
     error(bit);
     tiles_dropped_ = std::min(tiles_dropped_ + 1, 0xffffu);
-    if (bit != kErrorConfig) clocks_exact_ = false;
     stage_ = Stage::kDrain;
   }
 
@@ -473,7 +472,6 @@ class Arbiter {
 
   void close() {
     const bool dropped = stage_ != Stage::kIdle && stage_ != Stage::kDrain;
-    if (dropped) clocks_exact_ = false;
     forget();
     tiles_dropped_ = dropped ? 1 : 0;  // abort and clear in one command: the drop counts
     open_ = false;
@@ -595,7 +593,8 @@ class Arbiter {
   bool failed_ = false;
   unsigned errors_ = 0, error_count_ = 0, tiles_done_ = 0, tiles_dropped_ = 0, window_errors_ = 0;
   uint32_t tile_clocks_ = 0;
-  bool clocks_exact_ = true;
+  bool clocks_exact_ = true;  // of the tile in the engine
+  bool shown_exact_ = true;   // of tile_clocks_
   // Map buffer; cells map_[0 .. map_count_-1] have arrived
   bool map_busy_ = false, map_started_ = false;  // started: and not complete
   std::vector<MapCell> map_;
