@@ -229,6 +229,7 @@ class Pump {
                  read_payload(static_cast<uint16_t>(end - d.missing), keep)),
              client_.now()};
     read_order_ = read_.order;
+    read_began_ = d.missing;
     reading_ = true;
     heard_map_ = client_.now();
     cells_seen_ = 0;
@@ -452,8 +453,9 @@ class Pump {
     }
     if (!d.checked && d.known == d.there.size() / 2) ask(kStatus);  // so that the answer is there at the end
     if (m.order != read_order_) return;
-    // The range is over: on with what is missing. Not earlier, or what is on its way comes a second time.
-    if (uint32_t{m.index} + 1 == read_end_) {
+    // The range is over, or half of the ring can be freed: on with what is missing.
+    if (uint32_t{m.index} + 1 == read_end_ ||
+        (ring() && d.missing >= read_began_ + std::max(1u, (read_end_ - read_began_) / 2))) {
       send_read(d.missing < d.highest);
     }
   }
@@ -522,7 +524,7 @@ class Pump {
   Pending read_;          // until its status block came
   bool reading_ = false;  // a READ of tile wanted_ was sent
   uint64_t read_order_ = 0;
-  uint32_t read_end_ = 0;
+  uint32_t read_began_ = 0, read_end_ = 0;
   double heard_map_ = 0, map_gap_ = 0;
   double cells_seen_ = 0;  // when a status block first told of cells for the latest READ, 0: not yet
 

@@ -460,6 +460,7 @@ class Simulation {
     Message m = message(net::kRead, wanted_, missing);
     m.count = end - missing;
     m.keep = ring_ > 0 ? missing : 0;
+    read_began_ = missing;
     read_end_ = end;
     reading_ = true;
     read_unanswered_ = read_order_ = ask(m);
@@ -519,7 +520,10 @@ class Simulation {
     }
     if (!checked_ && down_missing_ == total / 2) ask(message(net::kStatus));
     if (order != read_order_) return;
-    if (chunk + 1 == read_end_) read();
+    if (chunk + 1 == read_end_ ||
+        (ring_ > 0 && down_missing_ >= read_began_ + std::max(1u, (read_end_ - read_began_) / 2))) {
+      read();
+    }
   }
 
   void finish() {
@@ -591,7 +595,7 @@ class Simulation {
   std::vector<bool> up_there_;
   std::deque<uint64_t> flying_;
   uint32_t known_ = 0, up_next_ = 0, up_base_ = 0;
-  uint32_t down_missing_ = 0, read_end_ = 0;
+  uint32_t down_missing_ = 0, read_began_ = 0, read_end_ = 0;
   uint64_t read_order_ = 0, read_unanswered_ = 0;
   uint64_t timer_ = 0;
 };

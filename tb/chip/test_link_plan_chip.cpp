@@ -134,7 +134,7 @@ TEST_CASE("link plan: stall clocks of the forecast are those of the Verilated ch
   const double tolerance = half_duplex ? 0.2 : 0.02;
   CHECK(static_cast<double>(f.engine_clocks) == engine);
   CHECK(stall == approx(m.elapsed - engine).epsilon(tolerance));
-  // With two in flight the engine may be on the next tile already when the host looks.
+  // With two in flight the unload may wait for the RELEASE of the map before.
   if (in_flight == 1) CHECK(tile_clocks == approx(m.tile_clocks).epsilon(tolerance));
   // Whole maps are asked for once, but in half duplex the host takes a map that waits for the medium for lost. Of a
   // ring's chunks it gets some twice.
