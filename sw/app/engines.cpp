@@ -117,7 +117,8 @@ EngineRun run_link_engine(const EngineRequest& r, const Gray& left, const Gray& 
       },
       [&](int i, std::vector<golden::MapCell> out) { cells[i] = std::move(out); },
       [&](uint64_t done) { progress(done, all); });
-  for (const auto& t : plan.tiles) link.clocks_expected += golden::engine_clocks(setup.format, t.job);
+  for (const auto& t : plan.tiles)
+    link.clocks_expected += golden::engine_clocks(setup.format, t.job) + net::kFirstPairClocks;
   link.statistics = client.statistics();
   run.link = link;
   run.result = to_result(setup, assemble(setup.rig, plan, cells));

@@ -396,7 +396,7 @@ class Arbiter {
           break;
         }
         // The row buffer's first pair comes 3 clocks after the start; the engine could take it after one.
-        tile_clocks_ = static_cast<uint32_t>(engine_clocks(config_.engine, job_)) + 2;
+        tile_clocks_ = static_cast<uint32_t>(engine_clocks(config_.engine, job_) + net::kFirstPairClocks);
         shown_exact_ = clocks_exact_;
         tiles_done_ = std::min(tiles_done_ + 1, 0xffffu);
         stage_ = Stage::kIdle;

@@ -96,7 +96,7 @@ struct Bench {
     };
     Scoreboard board("cell");
     std::set<int> done;
-    uint64_t clocks = 0;  // of the engine, if nothing stalls it; the row buffer's first pair comes 2 clocks late
+    uint64_t clocks = 0;  // of the engine, if nothing stalls it
     net::Client client(transport, 1.0, test_seed());
     const auto capabilities = client.info();
     net::LinkOptions options;
@@ -105,7 +105,7 @@ struct Bench {
         client, capabilities, plan.table, count, options, input,
         [&](int i, const std::vector<golden::MapCell>& cells) {
           const net::LinkTile in = input(i);
-          if (done.insert(i).second) clocks += golden::engine_clocks(format, in.job) + 2;
+          if (done.insert(i).second) clocks += golden::engine_clocks(format, in.job) + net::kFirstPairClocks;
           const auto model = golden::run_tile(format, in.job, plan.table, in.left, in.right);
           REQUIRE(cells.size() == model.cells.size());
           for (size_t at = 0; at < cells.size(); ++at)

@@ -105,7 +105,7 @@ TEST_CASE("a perfect link brings the map of the model, with no packet sent twice
   CHECK_FALSE(chip.session_open());
   uint64_t clocks = 0;
   // The row buffer's first pair comes two clocks later than the engine could take it.
-  for (const auto& tile : scene.plan.tiles) clocks += golden::engine_clocks(c.engine, tile.job) + 2;
+  for (const auto& tile : scene.plan.tiles) clocks += golden::engine_clocks(c.engine, tile.job) + net::kFirstPairClocks;
   CHECK(t.figures.engine_clocks == clocks);
   if (v.map_depth == 0) {  // a ring is asked for in pieces, which may overlap
     CHECK(t.statistics.duplicates == 0);
