@@ -4,7 +4,7 @@
 --              packet is taken as fast as it comes, the sweep runs to its end, and unload waits for its own stream only
 --   States   : idle, load (pixels), sweep (samples), flush (cells on their way to the map), unload, drain (pixels of a
 --              tile that was refused or too long)
---   Sweep    : plane after plane, row after row, one sample a clock; rows of max(sweep_cols, C_ROW_MIN) clocks; the
+--   Sweep    : G_LANES planes at once, a set, then the next set; row after row, one sample a clock and lane; rows of max(sweep_cols, C_ROW_MIN) clocks; the
 --              first sample in the clock after the last pixel; no bubble between rows or planes
 --   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
 --   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
@@ -25,7 +25,8 @@ entity control is
     G_PLANE_ROWS : integer := 130;
     G_PLANES     : integer := 301;
     G_WINDOW     : integer := 13;
-    G_MNCC_W     : integer := 13
+    G_MNCC_W     : integer := 13;
+    G_LANES      : integer := 1
   );
   port (
     clk : in  std_logic;
@@ -70,16 +71,17 @@ entity control is
     m_row_first   : out std_logic; -- i = 0, only with m_valid
     m_plane_first : out std_logic; -- j = 0, for the whole row
     m_plane_last  : out std_logic; -- last sample of the plane
-    m_plane       : out std_logic_vector(clog2(G_PLANES) - 1 downto 0);
+    m_plane       : out std_logic_vector(clog2((G_PLANES + G_LANES - 1) / G_LANES) - 1 downto 0); -- set
+    m_lanes       : out std_logic_vector(G_LANES - 1 downto 0); -- planes set * G_LANES + lane that the tile has
 
     -- Updating.
     map_start  : out std_logic; -- pulse with the first sample of a tile
     map_unload : out std_logic; -- pulse: all planes are in the map
     map_abort  : out std_logic; -- pulse: forget everything on its way
-    plane_done : in  std_logic; -- pulse: one more plane is in the map
+    plane_done : in  std_logic; -- pulse: one more set of planes is in the map
     map_last   : in  std_logic; -- the last map beat is being taken
 
-    window_error : in  std_logic; -- of address_generator, one a sample
+    window_error : in  std_logic_vector(G_LANES - 1 downto 0); -- of address_generator, one a sample
 
     state         : out std_logic_vector(2 downto 0);
     busy          : out std_logic;
@@ -100,6 +102,8 @@ architecture rtl of control is
   constant C_COL_W       : integer := clog2(imax(imax(G_IMG_COLS, C_SWEEP_COLS), C_ROW_MIN));
   constant C_ROW_W       : integer := clog2(imax(G_IMG_ROWS, C_SWEEP_ROWS));
   constant C_PLANE_W     : integer := clog2(G_PLANES);
+  constant C_LANE_W      : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
+  constant C_SET_W     : integer := clog2((G_PLANES + G_LANES - 1) / G_LANES);
   constant C_TABLE_W     : integer := C_PLANE_W + 3;
   constant C_TABLE_WORDS : integer := 8 * G_PLANES;
   -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, so the pipeline (about 100)
@@ -160,7 +164,10 @@ architecture rtl of control is
 
   signal col         : unsigned(C_COL_W - 1 downto 0);
   signal row         : unsigned(C_ROW_W - 1 downto 0);
-  signal plane       : unsigned(C_PLANE_W - 1 downto 0);
+  signal plane_set       : unsigned(C_SET_W - 1 downto 0);
+  signal last_wide   : unsigned(C_SET_W + C_PLANE_W + 1 downto 0); -- last_plane, wide enough for any slice
+  signal last_set  : unsigned(C_SET_W - 1 downto 0);
+  signal at_set_end    : std_logic; -- the last one
   signal last_col    : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
   signal last_row    : unsigned(C_ROW_W - 1 downto 0);
   signal at_col_end  : std_logic;
@@ -199,7 +206,9 @@ architecture rtl of control is
   signal cfg_event     : std_logic;
   signal tile_event    : std_logic;
   signal new_events    : unsigned(1 downto 0);
+  signal samples_lost  : unsigned(2 downto 0);
   signal sample_lost   : std_logic;
+  signal window_errors_next : unsigned(16 downto 0);
 
   signal error_bits          : std_logic_vector(7 downto 0);
   signal error_count_q       : unsigned(15 downto 0);
@@ -240,6 +249,9 @@ begin
     severity failure;
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
     report "control: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    severity failure;
+  assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
+    report "control: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
     severity failure;
 
   is_idle   <= to_bit(state_q = C_STATE_IDLE);
@@ -360,6 +372,13 @@ begin
     end if;
   end process p_registers;
 
+  m_lanes(0) <= '1';
+
+  g_mask : for n in 1 to G_LANES - 1 generate
+    m_lanes(n) <= not at_set_end or to_bit(last_wide(1 downto 0) >= n) when G_LANES = 4
+                  else not at_set_end or last_wide(0);
+  end generate g_mask;
+
   -- Only windows below C_ROW_MIN can have rows that need padding.
   g_padding : if G_WINDOW < C_ROW_MIN generate
     row_last_col <= sweep_last_col when sweep_last_col >= C_ROW_MIN - 1 else to_unsigned(C_ROW_MIN - 1, C_COL_W);
@@ -378,7 +397,10 @@ begin
   at_col_end  <= to_bit(col = last_col);
   at_row_end  <= to_bit(row = last_row);
   at_last     <= at_col_end and at_row_end;
-  at_tile_end <= is_sweep and at_last and to_bit(plane = last_plane);
+  last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
+  last_set  <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
+  at_set_end    <= to_bit(plane_set = last_set);
+  at_tile_end <= is_sweep and at_last and at_set_end;
   step        <= pix_fire or is_sweep;
   load_done   <= pix_fire and at_last and s_pix_tlast;
   event_short <= pix_fire and s_pix_tlast and not at_last;
@@ -446,14 +468,14 @@ begin
         end if;
       end if;
       if is_sweep = '1' and at_last = '1' then
-        plane <= plane + 1;
+        plane_set <= plane_set + 1;
       end if;
       if rst = '1' or is_idle = '1' then
         col   <= (others => '0');
         row   <= (others => '0');
-        plane <= (others => '0');
+        plane_set <= (others => '0');
       elsif at_tile_end = '1' then
-        plane <= (others => '0'); -- a legal table address
+        plane_set <= (others => '0'); -- a legal table address
       end if;
 
       -- Flags of the sample to come, so that no decoding lies before the table's address.
@@ -503,14 +525,27 @@ begin
   m_row_first   <= row_first;
   m_plane_first <= plane_first;
   m_plane_last  <= sample_last;
-  m_plane       <= std_logic_vector(plane);
+  m_plane       <= std_logic_vector(plane_set);
   map_start     <= start_q;
   map_unload    <= flushed;
   map_abort     <= abort_q;
 
   -- Status -----------------------------------------------------------------------------------------------------------
   -- In the clock after an abort the address generator still shows a sample of the tile.
-  sample_lost      <= window_error and not abort_q;
+  p_lost : process (window_error, abort_q)
+    variable v_count : unsigned(2 downto 0);
+  begin
+    v_count := (others => '0');
+    for n in 0 to G_LANES - 1 loop
+      if window_error(n) = '1' and abort_q = '0' then
+        v_count := v_count + 1;
+      end if;
+    end loop;
+    samples_lost <= v_count;
+  end process p_lost;
+
+  sample_lost      <= to_bit(samples_lost /= 0);
+  window_errors_next <= ('0' & window_errors_q) + samples_lost;
   event_window     <= sample_lost and not window_seen;
   cfg_event        <= event_config or event_table or event_address or event_busy;
   tile_event       <= event_short or event_long or event_window;
@@ -539,8 +574,14 @@ begin
       if tile_drop = '1' then
         tiles_dropped_q <= plus_1_saturated(tiles_dropped_q);
       end if;
-      if sample_lost = '1' then
-        window_errors_q <= plus_1_saturated(window_errors_q);
+      if G_LANES = 1 then -- the smaller circuit
+        if sample_lost = '1' then
+          window_errors_q <= plus_1_saturated(window_errors_q);
+        end if;
+      elsif window_errors_next(16) = '0' then
+        window_errors_q <= window_errors_next(15 downto 0);
+      else
+        window_errors_q <= (others => '1');
       end if;
       if event_window = '1' then
         window_seen <= '1';
@@ -562,8 +603,7 @@ begin
         tiles_done_q(0)              <= tile_done;
         tiles_dropped_q(15 downto 1) <= (others => '0');
         tiles_dropped_q(0)           <= tile_drop;
-        window_errors_q(15 downto 1) <= (others => '0');
-        window_errors_q(0)           <= sample_lost;
+        window_errors_q              <= resize(samples_lost, 16);
         window_seen                  <= event_window;
       end if;
       if start_ok = '1' then

@@ -2,6 +2,7 @@
 # Compile order, relative to this folder.
 psweep_pkg.vhd
 ram_sdp.vhd
+ram_2r.vhd
 stream_reg.vhd
 control.vhd
 address_generator.vhd

@@ -4,12 +4,14 @@
 --   Rate      : one plane cell per clock through the whole sweep, no bubble between rows or planes
 --   Clocks    : from the start command to the last map beat (port tile_clocks), without stalls outside,
 --                 win_cols * win_rows + tile_cols * tile_rows
---               + planes * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
---               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 43 + G_MNCC_W + G_FRAC_W
+--               + ceil(planes / G_LANES) * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
+--               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 42 + G_LANES + G_MNCC_W + G_FRAC_W
 --               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
 --   Numbers   : docs/numeric_contract.md
---   Lanes     : address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the
---               low bits. G_LANES = 1 in this version
+--   Lanes     : G_LANES planes (1, 2 or 4) are swept at once over one image buffer and one map, with the same results
+--               bit by bit. address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the low
+--               bits. Lane n sweeps planes n, n + G_LANES, n + 2 G_LANES ..; its part of the plane table holds just
+--               those. Lanes beyond the last plane rest
 --   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
 --   dbg_*     : outputs of the stages for waves and tests; leave open
 --   Golden    : sw/golden/psweep.hpp
@@ -104,6 +106,9 @@ end entity psweep;
 
 architecture rtl of psweep is
 
+  constant C_LANE_W   : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
+  constant C_SETS     : integer := (G_PLANES + G_LANES - 1) / G_LANES;
+  constant C_SET_W    : integer := clog2(C_SETS);
   constant C_BANK_W   : integer := clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2));
   constant C_SAMPLE_W : integer := G_PIX_W + G_INTERP_F;
 
@@ -112,6 +117,9 @@ architecture rtl of psweep is
   -- Registers and table writes.
   signal table_we     : std_logic;
   signal table_addr   : std_logic_vector(clog2(G_PLANES) + 2 downto 0);
+  -- Lane and word of a table write: plane n * G_LANES + lane is entry n of the lane.
+  signal table_wide   : unsigned(clog2(G_PLANES) + C_SET_W + 5 downto 0); -- table_addr, wide enough for any slice
+  signal lane_addr    : std_logic_vector(C_SET_W + 2 downto 0);
   signal offset_we    : std_logic;
   signal offset_addr  : std_logic_vector(1 downto 0);
   signal win_last_col : std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
@@ -136,7 +144,8 @@ architecture rtl of psweep is
   signal sweep_row_first   : std_logic;
   signal sweep_plane_first : std_logic;
   signal sweep_plane_last  : std_logic;
-  signal sweep_plane       : std_logic_vector(clog2(G_PLANES) - 1 downto 0);
+  signal sweep_set         : std_logic_vector(C_SET_W - 1 downto 0);
+  signal sweep_lanes       : std_logic_vector(G_LANES - 1 downto 0);
   signal map_start         : std_logic;
   signal map_unload        : std_logic;
   signal map_abort         : std_logic;
@@ -204,8 +213,8 @@ architecture rtl of psweep is
 begin
 
   -- Ranges of the other generics are checked by the entities that use them.
-  assert G_LANES = 1
-    report "psweep: G_LANES=" & integer'image(G_LANES) & " is not 1"
+  assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
+    report "psweep: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
     severity failure;
 
   pipe_rst <= rst or map_abort;
@@ -218,7 +227,8 @@ begin
       G_PLANE_ROWS => G_PLANE_ROWS,
       G_PLANES     => G_PLANES,
       G_WINDOW     => G_WINDOW,
-      G_MNCC_W     => G_MNCC_W
+      G_MNCC_W     => G_MNCC_W,
+      G_LANES      => G_LANES
     )
     port map (
       clk           => clk,
@@ -253,13 +263,14 @@ begin
       m_row_first   => sweep_row_first,
       m_plane_first => sweep_plane_first,
       m_plane_last  => sweep_plane_last,
-      m_plane       => sweep_plane,
+      m_plane       => sweep_set,
+      m_lanes       => sweep_lanes,
       map_start     => map_start,
       map_unload    => map_unload,
       map_abort     => map_abort,
       plane_done    => plane_done,
       map_last      => unload_done,
-      window_error  => address_window_error(0),
+      window_error  => address_window_error,
       state         => state,
       busy          => busy,
       errors        => errors,
@@ -270,11 +281,22 @@ begin
       tile_clocks   => tile_clocks
     );
 
+  table_wide <= resize(unsigned(table_addr), table_wide'length);
+  lane_addr  <= std_logic_vector(table_wide(C_SET_W + C_LANE_W + 2 downto C_LANE_W + 3) & table_wide(2 downto 0));
+
   g_address : for lane in 0 to G_LANES - 1 generate
+    signal lane_we        : std_logic;
+    signal lane_valid     : std_logic;
+    signal lane_row_first : std_logic;
+  begin
+
+    lane_we        <= table_we and to_bit(table_wide(4 downto 3) mod G_LANES = lane);
+    lane_valid     <= sweep_valid and sweep_lanes(lane);
+    lane_row_first <= sweep_row_first and sweep_lanes(lane);
 
     u_address_generator : entity work.address_generator
       generic map (
-        G_PLANES   => G_PLANES,
+        G_PLANES   => C_SETS,
         G_IMG_COLS => G_IMG_COLS,
         G_IMG_ROWS => G_IMG_ROWS,
         G_WEIGHT_W => G_WEIGHT_W
@@ -282,8 +304,8 @@ begin
       port map (
         clk              => clk,
         rst              => pipe_rst,
-        table_we         => table_we,
-        table_addr       => table_addr,
+        table_we         => lane_we,
+        table_addr       => lane_addr,
         offset_we        => offset_we,
         offset_addr      => offset_addr,
         cfg_data         => s_cfg_tdata(31 downto 0),
@@ -297,11 +319,11 @@ begin
         right_x_hi       => right_x_hi,
         right_y_lo       => right_y_lo,
         right_y_hi       => right_y_hi,
-        s_valid          => sweep_valid,
-        s_row_first      => sweep_row_first,
+        s_valid          => lane_valid,
+        s_row_first      => lane_row_first,
         s_plane_first    => sweep_plane_first,
         s_plane_last     => sweep_plane_last,
-        s_plane          => sweep_plane,
+        s_plane          => sweep_set,
         m_valid          => address_valid(lane),
         m_row_first      => address_row_first(lane),
         m_plane_first    => address_plane_first(lane),
@@ -330,7 +352,8 @@ begin
       G_IMG_COLS => G_IMG_COLS,
       G_IMG_ROWS => G_IMG_ROWS,
       G_PIX_W    => G_PIX_W,
-      G_WEIGHT_W => G_WEIGHT_W
+      G_WEIGHT_W => G_WEIGHT_W,
+      G_LANES    => G_LANES
     )
     port map (
       clk              => clk,
@@ -341,42 +364,42 @@ begin
       load_row_odd     => load_row_odd,
       load_row_end     => load_row_end,
       load_data        => s_pix_tdata,
-      s_valid          => address_valid(0),
-      s_row_first      => address_row_first(0),
-      s_plane_first    => address_plane_first(0),
-      s_plane_last     => address_plane_last(0),
-      s_usable_x       => address_usable_x(0),
-      s_usable_y       => address_usable_y(0),
-      s_xi_left        => address_xi_left(clog2(G_IMG_COLS) - 1 downto 0),
-      s_yi_odd_left    => address_yi_left(0),
-      s_fx_left        => address_fx_left(G_WEIGHT_W - 1 downto 0),
-      s_fy_left        => address_fy_left(G_WEIGHT_W - 1 downto 0),
-      s_xi_right       => address_xi_right(clog2(G_IMG_COLS) - 1 downto 0),
-      s_yi_odd_right   => address_yi_right(0),
-      s_fx_right       => address_fx_right(G_WEIGHT_W - 1 downto 0),
-      s_fy_right       => address_fy_right(G_WEIGHT_W - 1 downto 0),
-      s_row_even_left  => address_row_even_left(C_BANK_W - 1 downto 0),
-      s_row_odd_left   => address_row_odd_left(C_BANK_W - 1 downto 0),
-      s_row_even_right => address_row_even_right(C_BANK_W - 1 downto 0),
-      s_row_odd_right  => address_row_odd_right(C_BANK_W - 1 downto 0),
-      m_valid          => quad_valid(0),
-      m_row_first      => quad_row_first(0),
-      m_plane_first    => quad_plane_first(0),
-      m_plane_last     => quad_plane_last(0),
-      m_usable_x       => quad_usable_x(0),
-      m_usable_y       => quad_usable_y(0),
-      m_fx_left        => quad_fx_left(G_WEIGHT_W - 1 downto 0),
-      m_fy_left        => quad_fy_left(G_WEIGHT_W - 1 downto 0),
-      m_fx_right       => quad_fx_right(G_WEIGHT_W - 1 downto 0),
-      m_fy_right       => quad_fy_right(G_WEIGHT_W - 1 downto 0),
-      m_p00_left       => quad_p00_left(G_PIX_W - 1 downto 0),
-      m_p10_left       => quad_p10_left(G_PIX_W - 1 downto 0),
-      m_p01_left       => quad_p01_left(G_PIX_W - 1 downto 0),
-      m_p11_left       => quad_p11_left(G_PIX_W - 1 downto 0),
-      m_p00_right      => quad_p00_right(G_PIX_W - 1 downto 0),
-      m_p10_right      => quad_p10_right(G_PIX_W - 1 downto 0),
-      m_p01_right      => quad_p01_right(G_PIX_W - 1 downto 0),
-      m_p11_right      => quad_p11_right(G_PIX_W - 1 downto 0)
+      s_valid          => address_valid,
+      s_row_first      => address_row_first,
+      s_plane_first    => address_plane_first,
+      s_plane_last     => address_plane_last,
+      s_usable_x       => address_usable_x,
+      s_usable_y       => address_usable_y,
+      s_xi_left        => address_xi_left,
+      s_yi_left        => address_yi_left,
+      s_fx_left        => address_fx_left,
+      s_fy_left        => address_fy_left,
+      s_xi_right       => address_xi_right,
+      s_yi_right       => address_yi_right,
+      s_fx_right       => address_fx_right,
+      s_fy_right       => address_fy_right,
+      s_row_even_left  => address_row_even_left,
+      s_row_odd_left   => address_row_odd_left,
+      s_row_even_right => address_row_even_right,
+      s_row_odd_right  => address_row_odd_right,
+      m_valid          => quad_valid,
+      m_row_first      => quad_row_first,
+      m_plane_first    => quad_plane_first,
+      m_plane_last     => quad_plane_last,
+      m_usable_x       => quad_usable_x,
+      m_usable_y       => quad_usable_y,
+      m_fx_left        => quad_fx_left,
+      m_fy_left        => quad_fy_left,
+      m_fx_right       => quad_fx_right,
+      m_fy_right       => quad_fy_right,
+      m_p00_left       => quad_p00_left,
+      m_p10_left       => quad_p10_left,
+      m_p01_left       => quad_p01_left,
+      m_p11_left       => quad_p11_left,
+      m_p00_right      => quad_p00_right,
+      m_p10_right      => quad_p10_right,
+      m_p01_right      => quad_p01_right,
+      m_p11_right      => quad_p11_right
     );
 
   g_similarity : for lane in 0 to G_LANES - 1 generate
@@ -450,18 +473,19 @@ begin
       G_CELLS  => G_PLANE_COLS * G_PLANE_ROWS,
       G_PLANES => G_PLANES,
       G_MNCC_W => G_MNCC_W,
-      G_FRAC_W => G_FRAC_W
+      G_FRAC_W => G_FRAC_W,
+      G_LANES  => G_LANES
     )
     port map (
       clk                => clk,
       rst                => rst,
       start              => map_start,
       cancel             => map_abort,
-      s_valid            => cell_valid(0),
+      s_valid            => cell_valid,
       s_last             => cell_last(0),
-      s_inside           => cell_inside(0),
-      s_textured         => cell_textured(0),
-      s_v                => cell_v(G_MNCC_W - 1 downto 0),
+      s_inside           => cell_inside,
+      s_textured         => cell_textured,
+      s_v                => cell_v,
       threshold          => threshold,
       plane_done         => plane_done,
       unload             => map_unload,

@@ -1,8 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- storage: the loaded windows of both images, four banks each, interleaved by the parities of x and y, so that any
 --          2x2 neighbourhood is read in one clock (paper, section 4.2.1, equation 2).
---   Rate     : one sample (2x2 pixels of each image) per clock; writes: one pixel of each image per clock
+--   Rate     : one sample (2x2 pixels of each image) per lane and clock; writes: one pixel of each image per clock
 --   Latency  : C_STORAGE_LATENCY = 4 clocks from s_* to m_*
+--   Lanes    : bundles hold lane 0 in the low bits. A block RAM has two ports, and nobody writes while a tile is swept:
+--              lanes 0 and 1 read the same banks, each through its own port, any sample at any time (ram_2r). Lanes 2
+--              and 3 have a second copy. So two lanes need no more RAM than one, and no lane depends on where another
+--              reads
 --   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator
 --   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W) passed through
 --   Unusable : a sample that is not usable in x and y reads address 0; its pixels mean nothing
@@ -18,7 +22,8 @@ entity storage is
     G_IMG_COLS : integer := 340;
     G_IMG_ROWS : integer := 144;
     G_PIX_W    : integer := 8;
-    G_WEIGHT_W : integer := 8
+    G_WEIGHT_W : integer := 8;
+    G_LANES    : integer := 1
   );
   port (
     clk : in  std_logic;
@@ -32,45 +37,46 @@ entity storage is
     load_row_end : in  std_logic;
     load_data    : in  std_logic_vector(2 * G_PIX_W - 1 downto 0);
 
-    -- As address_generator's m_*: s_yi_*, s_fy_* and s_row_* change at most with s_row_first.
-    s_valid          : in  std_logic;
-    s_row_first      : in  std_logic;
-    s_plane_first    : in  std_logic;
-    s_plane_last     : in  std_logic;
-    s_usable_x       : in  std_logic;
-    s_usable_y       : in  std_logic;
-    s_xi_left        : in  std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0); -- low bits of xi
-    s_yi_odd_left    : in  std_logic; -- bit 0 of yi
-    s_fx_left        : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    s_fy_left        : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    s_xi_right       : in  std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
-    s_yi_odd_right   : in  std_logic;
-    s_fx_right       : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    s_fy_right       : in  std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    s_row_even_left  : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    s_row_odd_left   : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    s_row_even_right : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    s_row_odd_right  : in  std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    -- As address_generator's m_*: s_yi_*, s_fy_* and s_row_* change at most with s_row_first. Of xi only the low
+    -- clog2(G_IMG_COLS) bits, of yi only bit 0 is looked at.
+    s_valid          : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_row_first      : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_plane_first    : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_plane_last     : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_usable_x       : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_usable_y       : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_xi_left        : in  std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    s_yi_left        : in  std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    s_fx_left        : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    s_fy_left        : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    s_xi_right       : in  std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    s_yi_right       : in  std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
+    s_fx_right       : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    s_fy_right       : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    s_row_even_left  : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_odd_left   : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_even_right : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_odd_right  : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
 
     -- p10 is the right neighbour of p00, p01 the one below. m_fy_* hold for a row, like s_fy_*.
-    m_valid       : out std_logic;
-    m_row_first   : out std_logic;
-    m_plane_first : out std_logic;
-    m_plane_last  : out std_logic;
-    m_usable_x    : out std_logic;
-    m_usable_y    : out std_logic;
-    m_fx_left     : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    m_fy_left     : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    m_fx_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    m_fy_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
-    m_p00_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p10_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p01_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p11_left    : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p00_right   : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p10_right   : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p01_right   : out std_logic_vector(G_PIX_W - 1 downto 0);
-    m_p11_right   : out std_logic_vector(G_PIX_W - 1 downto 0)
+    m_valid       : out std_logic_vector(G_LANES - 1 downto 0);
+    m_row_first   : out std_logic_vector(G_LANES - 1 downto 0);
+    m_plane_first : out std_logic_vector(G_LANES - 1 downto 0);
+    m_plane_last  : out std_logic_vector(G_LANES - 1 downto 0);
+    m_usable_x    : out std_logic_vector(G_LANES - 1 downto 0);
+    m_usable_y    : out std_logic_vector(G_LANES - 1 downto 0);
+    m_fx_left     : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    m_fy_left     : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    m_fx_right    : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    m_fy_right    : out std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
+    m_p00_left    : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p10_left    : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p01_left    : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p11_left    : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p00_right   : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p10_right   : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p01_right   : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0);
+    m_p11_right   : out std_logic_vector(G_LANES * G_PIX_W - 1 downto 0)
   );
 end entity storage;
 
@@ -80,37 +86,34 @@ architecture rtl of storage is
   constant C_DEPTH  : integer := G_IMG_COLS / 2 * (G_IMG_ROWS / 2);
   constant C_BANK_W : integer := clog2(C_DEPTH);
   constant C_COL_W  : integer := clog2(G_IMG_COLS);
+  constant C_COPIES : integer := (G_LANES + 1) / 2;
 
   -- Load.
   signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row pair being loaded
+  signal write_next : std_logic_vector(C_BANK_W - 1 downto 0);
   signal write_addr : std_logic_vector(C_BANK_W - 1 downto 0);
   signal write_data : std_logic_vector(2 * G_PIX_W - 1 downto 0);
   signal write_bank : std_logic_vector(3 downto 0); -- one-hot: 2 * (y mod 2) + x mod 2
 
-  -- Both images behind each other, the left one in the low half, so that one generate serves both.
-  signal s0_xi       : std_logic_vector(2 * C_COL_W - 1 downto 0);
-  signal s0_y_odd    : std_logic_vector(1 downto 0);
-  signal s0_row_even : std_logic_vector(2 * C_BANK_W - 1 downto 0);
-  signal s0_row_odd  : std_logic_vector(2 * C_BANK_W - 1 downto 0);
-  signal s0_unusable : std_logic;
-  signal s4_p00      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
-  signal s4_p10      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
-  signal s4_p01      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
-  signal s4_p11      : std_logic_vector(2 * G_PIX_W - 1 downto 0);
-
-  -- Way of the strobes and of what belongs to a sample; index or prefix = stage.
-  signal valid       : std_logic_vector(3 downto 1);
-  signal row_first   : std_logic_vector(3 downto 1);
-  signal plane_first : std_logic_vector(3 downto 1);
-  signal plane_last  : std_logic_vector(3 downto 1);
-  signal usable_x    : std_logic_vector(3 downto 1);
-  signal usable_y    : std_logic_vector(3 downto 1);
-  signal s1_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
-  signal s2_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
-  signal s3_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
-  signal s1_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
-  signal s2_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
-  signal s3_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  -- Both images behind each other, all lanes of the left one in the low half, so that one generate serves both.
+  signal s0_xi       : std_logic_vector(2 * G_LANES * C_INT_W - 1 downto 0);
+  signal s0_yi       : std_logic_vector(2 * G_LANES * C_INT_W - 1 downto 0);
+  signal s0_row_even : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s0_row_odd  : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s0_unusable : std_logic_vector(G_LANES - 1 downto 0);
+  -- s1: addresses of the four banks, for each image and lane; s2, s3: inside the RAMs; s3: their words; s4: the quads.
+  signal s1_addr_0 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s1_addr_1 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s1_addr_2 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s1_addr_3 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s3_word_0 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s3_word_1 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s3_word_2 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s3_word_3 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s4_p00    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s4_p10    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s4_p01    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s4_p11    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
 
   -- Address of the even (round_up = xi mod 2) or odd (round_up = 0) one of columns xi, xi+1. The increment enters as a
   -- carry, from a bit that is cut off again, so this is one adder.
@@ -153,11 +156,16 @@ begin
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
     report "storage: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
     severity failure;
+  assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
+    report "storage: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    severity failure;
+
+  write_next <= std_logic_vector(write_row + resize(unsigned(load_col(C_COL_W - 1 downto 1)), C_BANK_W));
 
   p_load : process (clk)
   begin
     if rising_edge(clk) then
-      write_addr    <= std_logic_vector(write_row + resize(unsigned(load_col(C_COL_W - 1 downto 1)), C_BANK_W));
+      write_addr    <= write_next;
       write_data    <= load_data;
       write_bank(0) <= load_valid and not load_row_odd and not load_col(0);
       write_bank(1) <= load_valid and not load_row_odd and load_col(0);
@@ -175,155 +183,257 @@ begin
   end process p_load;
 
   s0_xi       <= s_xi_right & s_xi_left;
-  s0_y_odd    <= s_yi_odd_right & s_yi_odd_left;
+  s0_yi       <= s_yi_right & s_yi_left;
   s0_row_even <= s_row_even_right & s_row_even_left;
   s0_row_odd  <= s_row_odd_right & s_row_odd_left;
   s0_unusable <= not (s_usable_x and s_usable_y);
 
-  g_image : for n in 0 to 1 generate
-    signal row_even    : std_logic_vector(C_BANK_W - 1 downto 0);
-    signal row_odd     : std_logic_vector(C_BANK_W - 1 downto 0);
-    signal xi          : std_logic_vector(C_COL_W - 1 downto 0);
-    signal write_pixel : std_logic_vector(G_PIX_W - 1 downto 0);
-    -- s1: addresses of the four banks.
-    signal s1_addr_0 : std_logic_vector(C_BANK_W - 1 downto 0);
-    signal s1_addr_1 : std_logic_vector(C_BANK_W - 1 downto 0);
-    signal s1_addr_2 : std_logic_vector(C_BANK_W - 1 downto 0);
-    signal s1_addr_3 : std_logic_vector(C_BANK_W - 1 downto 0);
-    -- s2, s3: inside the RAMs; their words, and the parities of the sample.
-    signal s3_word_0 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal s3_word_1 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal s3_word_2 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal s3_word_3 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal x_odd     : std_logic_vector(3 downto 1);
-    signal y_odd     : std_logic_vector(3 downto 1);
-    -- s4: the quad.
-    signal s4_pixel_00 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal s4_pixel_10 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal s4_pixel_01 : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal s4_pixel_11 : std_logic_vector(G_PIX_W - 1 downto 0);
+  -- One of image and lane: addresses, and the choice among the words.
+  g_reader : for n in 0 to 2 * G_LANES - 1 generate
+    signal row_even : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal row_odd  : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal xi       : std_logic_vector(C_COL_W - 1 downto 0);
+    signal x_odd    : std_logic_vector(3 downto 1);
+    signal y_odd    : std_logic_vector(3 downto 1);
+    signal addr_0   : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal addr_1   : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal addr_2   : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal addr_3   : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal word_0   : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal word_1   : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal word_2   : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal word_3   : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal p00      : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal p10      : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal p01      : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal p11      : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal writes   : std_logic; -- the port of an even lane writes the pixel that comes
   begin
 
-    row_even    <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
-    row_odd     <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
-    xi          <= s0_xi((n + 1) * C_COL_W - 1 downto n * C_COL_W);
-    write_pixel <= write_data((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+    row_even <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
+    row_odd  <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
+    xi       <= s0_xi(n * C_INT_W + C_COL_W - 1 downto n * C_INT_W);
+    writes   <= load_valid and to_bit(G_LANES > 1 and n mod 2 = 0);
 
     p_read : process (clk)
     begin
       if rising_edge(clk) then
-        s1_addr_0 <= bank_address(row_even, xi, xi(0));
-        s1_addr_1 <= bank_address(row_even, xi, '0');
-        s1_addr_2 <= bank_address(row_odd, xi, xi(0));
-        s1_addr_3 <= bank_address(row_odd, xi, '0');
-        if s0_unusable = '1' then -- keeps addresses legal
-          s1_addr_0 <= (others => '0');
-          s1_addr_1 <= (others => '0');
-          s1_addr_2 <= (others => '0');
-          s1_addr_3 <= (others => '0');
+        addr_0 <= bank_address(row_even, xi, xi(0));
+        addr_1 <= bank_address(row_even, xi, '0');
+        addr_2 <= bank_address(row_odd, xi, xi(0));
+        addr_3 <= bank_address(row_odd, xi, '0');
+        if writes = '1' then
+          addr_0 <= write_next;
+          addr_1 <= write_next;
+          addr_2 <= write_next;
+          addr_3 <= write_next;
+        elsif s0_unusable(n mod G_LANES) = '1' then -- keeps addresses legal
+          addr_0 <= (others => '0');
+          addr_1 <= (others => '0');
+          addr_2 <= (others => '0');
+          addr_3 <= (others => '0');
         end if;
-        x_odd       <= x_odd(2 downto 1) & xi(0);
-        y_odd       <= y_odd(2 downto 1) & s0_y_odd(n);
-        s4_pixel_00 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, y_odd(3), x_odd(3));
-        s4_pixel_10 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, y_odd(3), not x_odd(3));
-        s4_pixel_01 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, not y_odd(3), x_odd(3));
-        s4_pixel_11 <= pick(s3_word_0, s3_word_1, s3_word_2, s3_word_3, not y_odd(3), not x_odd(3));
+        x_odd <= x_odd(2 downto 1) & xi(0);
+        y_odd <= y_odd(2 downto 1) & s0_yi(n * C_INT_W);
+        p00   <= pick(word_0, word_1, word_2, word_3, y_odd(3), x_odd(3));
+        p10   <= pick(word_0, word_1, word_2, word_3, y_odd(3), not x_odd(3));
+        p01   <= pick(word_0, word_1, word_2, word_3, not y_odd(3), x_odd(3));
+        p11   <= pick(word_0, word_1, word_2, word_3, not y_odd(3), not x_odd(3));
       end if;
     end process p_read;
 
-    u_bank_0 : entity work.ram_sdp
-      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-      port map (
-        clk   => clk,
-        we    => write_bank(0),
-        waddr => write_addr,
-        wdata => write_pixel,
-        raddr => s1_addr_0,
-        rdata => s3_word_0
-      );
+    s1_addr_0((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_0;
+    s1_addr_1((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_1;
+    s1_addr_2((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_2;
+    s1_addr_3((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_3;
+    word_0 <= s3_word_0((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+    word_1 <= s3_word_1((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+    word_2 <= s3_word_2((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+    word_3 <= s3_word_3((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+    s4_p00((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p00;
+    s4_p10((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p10;
+    s4_p01((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p01;
+    s4_p11((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p11;
 
-    u_bank_1 : entity work.ram_sdp
-      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-      port map (
-        clk   => clk,
-        we    => write_bank(1),
-        waddr => write_addr,
-        wdata => write_pixel,
-        raddr => s1_addr_1,
-        rdata => s3_word_1
-      );
+  end generate g_reader;
 
-    u_bank_2 : entity work.ram_sdp
-      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-      port map (
-        clk   => clk,
-        we    => write_bank(2),
-        waddr => write_addr,
-        wdata => write_pixel,
-        raddr => s1_addr_2,
-        rdata => s3_word_2
-      );
+  g_image : for image in 0 to 1 generate
+    signal write_pixel : std_logic_vector(G_PIX_W - 1 downto 0);
+  begin
 
-    u_bank_3 : entity work.ram_sdp
-      generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-      port map (
-        clk   => clk,
-        we    => write_bank(3),
-        waddr => write_addr,
-        wdata => write_pixel,
-        raddr => s1_addr_3,
-        rdata => s3_word_3
-      );
+    write_pixel <= write_data((image + 1) * G_PIX_W - 1 downto image * G_PIX_W);
 
-    s4_p00((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_00;
-    s4_p10((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_10;
-    s4_p01((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_01;
-    s4_p11((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= s4_pixel_11;
+    g_one : if G_LANES = 1 generate
+
+      u_bank_0 : entity work.ram_sdp
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+        port map (
+          clk   => clk,
+          we    => write_bank(0),
+          waddr => write_addr,
+          wdata => write_pixel,
+          raddr => s1_addr_0((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
+          rdata => s3_word_0((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+        );
+
+      u_bank_1 : entity work.ram_sdp
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+        port map (
+          clk   => clk,
+          we    => write_bank(1),
+          waddr => write_addr,
+          wdata => write_pixel,
+          raddr => s1_addr_1((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
+          rdata => s3_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+        );
+
+      u_bank_2 : entity work.ram_sdp
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+        port map (
+          clk   => clk,
+          we    => write_bank(2),
+          waddr => write_addr,
+          wdata => write_pixel,
+          raddr => s1_addr_2((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
+          rdata => s3_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+        );
+
+      u_bank_3 : entity work.ram_sdp
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+        port map (
+          clk   => clk,
+          we    => write_bank(3),
+          waddr => write_addr,
+          wdata => write_pixel,
+          raddr => s1_addr_3((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
+          rdata => s3_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+        );
+
+    end generate g_one;
+
+    g_pair : if G_LANES > 1 generate
+
+      g_copy : for copy in 0 to C_COPIES - 1 generate
+        constant C_A : integer := image * G_LANES + 2 * copy;
+        constant C_B : integer := C_A + 1;
+      begin
+
+        u_bank_0 : entity work.ram_2r
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+          port map (
+            clk     => clk,
+            a_we    => write_bank(0),
+            a_addr  => s1_addr_0((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+            a_wdata => write_pixel,
+            a_rdata => s3_word_0((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
+            b_addr  => s1_addr_0((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
+            b_rdata => s3_word_0((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+          );
+
+        u_bank_1 : entity work.ram_2r
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+          port map (
+            clk     => clk,
+            a_we    => write_bank(1),
+            a_addr  => s1_addr_1((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+            a_wdata => write_pixel,
+            a_rdata => s3_word_1((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
+            b_addr  => s1_addr_1((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
+            b_rdata => s3_word_1((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+          );
+
+        u_bank_2 : entity work.ram_2r
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+          port map (
+            clk     => clk,
+            a_we    => write_bank(2),
+            a_addr  => s1_addr_2((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+            a_wdata => write_pixel,
+            a_rdata => s3_word_2((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
+            b_addr  => s1_addr_2((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
+            b_rdata => s3_word_2((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+          );
+
+        u_bank_3 : entity work.ram_2r
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+          port map (
+            clk     => clk,
+            a_we    => write_bank(3),
+            a_addr  => s1_addr_3((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+            a_wdata => write_pixel,
+            a_rdata => s3_word_3((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
+            b_addr  => s1_addr_3((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
+            b_rdata => s3_word_3((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+          );
+
+      end generate g_copy;
+
+    end generate g_pair;
 
   end generate g_image;
 
-  m_p00_left  <= s4_p00(G_PIX_W - 1 downto 0);
-  m_p10_left  <= s4_p10(G_PIX_W - 1 downto 0);
-  m_p01_left  <= s4_p01(G_PIX_W - 1 downto 0);
-  m_p11_left  <= s4_p11(G_PIX_W - 1 downto 0);
-  m_p00_right <= s4_p00(2 * G_PIX_W - 1 downto G_PIX_W);
-  m_p10_right <= s4_p10(2 * G_PIX_W - 1 downto G_PIX_W);
-  m_p01_right <= s4_p01(2 * G_PIX_W - 1 downto G_PIX_W);
-  m_p11_right <= s4_p11(2 * G_PIX_W - 1 downto G_PIX_W);
+  m_p00_left  <= s4_p00(G_LANES * G_PIX_W - 1 downto 0);
+  m_p10_left  <= s4_p10(G_LANES * G_PIX_W - 1 downto 0);
+  m_p01_left  <= s4_p01(G_LANES * G_PIX_W - 1 downto 0);
+  m_p11_left  <= s4_p11(G_LANES * G_PIX_W - 1 downto 0);
+  m_p00_right <= s4_p00(2 * G_LANES * G_PIX_W - 1 downto G_LANES * G_PIX_W);
+  m_p10_right <= s4_p10(2 * G_LANES * G_PIX_W - 1 downto G_LANES * G_PIX_W);
+  m_p01_right <= s4_p01(2 * G_LANES * G_PIX_W - 1 downto G_LANES * G_PIX_W);
+  m_p11_right <= s4_p11(2 * G_LANES * G_PIX_W - 1 downto G_LANES * G_PIX_W);
 
-  p_sideband : process (clk)
+  g_sideband : for n in 0 to G_LANES - 1 generate
+    constant C_LO : integer := n * G_WEIGHT_W;
+    constant C_HI : integer := C_LO + G_WEIGHT_W - 1;
+    -- Way of the strobes and of what belongs to a sample; index or prefix = stage.
+    signal valid       : std_logic_vector(4 downto 1);
+    signal row_first   : std_logic_vector(4 downto 1);
+    signal plane_first : std_logic_vector(4 downto 1);
+    signal plane_last  : std_logic_vector(4 downto 1);
+    signal usable_x    : std_logic_vector(4 downto 1);
+    signal usable_y    : std_logic_vector(4 downto 1);
+    signal s1_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    signal s2_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    signal s3_fx_left  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    signal s1_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    signal s2_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+    signal s3_fx_right : std_logic_vector(G_WEIGHT_W - 1 downto 0);
   begin
-    if rising_edge(clk) then
-      valid         <= valid(2 downto 1) & s_valid;
-      row_first     <= row_first(2 downto 1) & s_row_first;
-      plane_first   <= plane_first(2 downto 1) & s_plane_first;
-      plane_last    <= plane_last(2 downto 1) & s_plane_last;
-      usable_x      <= usable_x(2 downto 1) & s_usable_x;
-      usable_y      <= usable_y(2 downto 1) & s_usable_y;
-      m_valid       <= valid(3);
-      m_row_first   <= row_first(3);
-      m_plane_first <= plane_first(3);
-      m_plane_last  <= plane_last(3);
-      m_usable_x    <= usable_x(3);
-      m_usable_y    <= usable_y(3);
-      s1_fx_left    <= s_fx_left;
-      s2_fx_left    <= s1_fx_left;
-      s3_fx_left    <= s2_fx_left;
-      m_fx_left     <= s3_fx_left;
-      s1_fx_right   <= s_fx_right;
-      s2_fx_right   <= s1_fx_right;
-      s3_fx_right   <= s2_fx_right;
-      m_fx_right    <= s3_fx_right;
-      -- Constant over a row of at least C_ROW_MIN clocks: one register instead of a delay line.
-      if row_first(3) = '1' then
-        m_fy_left  <= s_fy_left;
-        m_fy_right <= s_fy_right;
+
+    m_valid(n)       <= valid(4);
+    m_row_first(n)   <= row_first(4);
+    m_plane_first(n) <= plane_first(4);
+    m_plane_last(n)  <= plane_last(4);
+    m_usable_x(n)    <= usable_x(4);
+    m_usable_y(n)    <= usable_y(4);
+
+    p_sideband : process (clk)
+    begin
+      if rising_edge(clk) then
+        valid       <= valid(3 downto 1) & s_valid(n);
+        row_first   <= row_first(3 downto 1) & s_row_first(n);
+        plane_first <= plane_first(3 downto 1) & s_plane_first(n);
+        plane_last  <= plane_last(3 downto 1) & s_plane_last(n);
+        usable_x    <= usable_x(3 downto 1) & s_usable_x(n);
+        usable_y    <= usable_y(3 downto 1) & s_usable_y(n);
+        s1_fx_left  <= s_fx_left(C_HI downto C_LO);
+        s2_fx_left  <= s1_fx_left;
+        s3_fx_left  <= s2_fx_left;
+        s1_fx_right <= s_fx_right(C_HI downto C_LO);
+        s2_fx_right <= s1_fx_right;
+        s3_fx_right <= s2_fx_right;
+        m_fx_left(C_HI downto C_LO)  <= s3_fx_left;
+        m_fx_right(C_HI downto C_LO) <= s3_fx_right;
+        -- Constant over a row of at least C_ROW_MIN clocks: one register instead of a delay line.
+        if row_first(3) = '1' then
+          m_fy_left(C_HI downto C_LO)  <= s_fy_left(C_HI downto C_LO);
+          m_fy_right(C_HI downto C_LO) <= s_fy_right(C_HI downto C_LO);
+        end if;
+        if rst = '1' then
+          valid <= (others => '0');
+        end if;
       end if;
-      if rst = '1' then
-        valid   <= (others => '0');
-        m_valid <= '0';
-      end if;
-    end if;
-  end process p_sideband;
+    end process p_sideband;
+
+  end generate g_sideband;
 
 end architecture rtl;

@@ -4,11 +4,15 @@
 --             RAM. Two values of V suffice (the best and the one before it); the fraction of the parabola is computed
 --             when the plane behind the best one comes by, and stored instead of a third.
 --   Rate    : one cell per clock: read, change, write; unload: one cell per clock while m_tready = '1'
---   Latency : updating_latency(G_FRAC_W) clocks from a cell's V to its write (psweep_pkg); unload 2 clocks to the first
---             beat
+--   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage per
+--             lane in the order of planes, and is written once. Of the parabolas due in a set only the last one counts
+--             (a better V later in the set voids those before it), so there is one divider
+--   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 2 clocks to
+--             the first beat
 --   Numbers : V ufix(0,G_MNCC_W); fraction a / (a + c) = offset + 1/2, ufix(0,G_FRAC_W), truncated
---   Planes  : counted here, by s_last; plane 0 ignores the stored word, so the map is never cleared. A plane must take
---             more clocks than the loop (control: at least 3 C_ROW_MIN)
+--   Planes  : sets are counted here, by s_last; set 0 ignores the stored word, so the map is never cleared. A set must
+--             take more clocks than the loop (control: at least 3 C_ROW_MIN). A lane without s_valid in a set has no
+--             plane there; lane 0 always has one
 --   Mask    : bit 0 outside, 1 no variance, 2 below threshold, 3 not a local maximum; while a cell has no winner, the
 --             low bits of its fraction remember whether it was ever inside (0) and textured (1)
 --   Reset   : and cancel: valids, counters; the map keeps its contents
@@ -23,7 +27,8 @@ entity updating is
     G_CELLS  : integer := 33280;
     G_PLANES : integer := 301;
     G_MNCC_W : integer := 13;
-    G_FRAC_W : integer := 8
+    G_FRAC_W : integer := 8;
+    G_LANES  : integer := 1
   );
   port (
     clk : in  std_logic;
@@ -32,14 +37,14 @@ entity updating is
     start  : in  std_logic; -- pulse: the next cell is the first of a new tile
     cancel : in  std_logic; -- pulse: forget what is on its way
 
-    s_valid    : in  std_logic;
-    s_last     : in  std_logic; -- last cell of the plane
-    s_inside   : in  std_logic;
-    s_textured : in  std_logic;
-    s_v        : in  std_logic_vector(G_MNCC_W - 1 downto 0);
+    s_valid    : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_last     : in  std_logic; -- last cell of the set, of lane 0
+    s_inside   : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_textured : in  std_logic_vector(G_LANES - 1 downto 0);
+    s_v        : in  std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
     threshold  : in  std_logic_vector(G_MNCC_W - 1 downto 0); -- static during a tile
 
-    plane_done  : out std_logic; -- pulse: the last cell of a plane is in the map
+    plane_done  : out std_logic; -- pulse: the last cell of a set is in the map
     unload      : in  std_logic; -- pulse, behind the plane_done of the last plane
     unload_done : out std_logic; -- the last beat is being taken
 
@@ -64,6 +69,8 @@ architecture rtl of updating is
 
   constant C_ADDR_W  : integer := clog2(G_CELLS);
   constant C_PLANE_W : integer := clog2(G_PLANES);
+  constant C_LANE_W  : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
+  constant C_SET_W   : integer := clog2((G_PLANES + G_LANES - 1) / G_LANES);
   constant C_WORD_W  : integer := 2 * G_MNCC_W + C_PLANE_W + G_FRAC_W + 2;
   constant C_DATA_W  : integer := 4 + C_PLANE_W + G_FRAC_W + G_MNCC_W;
   -- What a cell takes along while its fraction is computed: the word, and whether to take the quotient.
@@ -75,9 +82,9 @@ architecture rtl of updating is
   signal read_cell : unsigned(C_ADDR_W - 1 downto 0);
   signal held_cell : unsigned(C_ADDR_W - 1 downto 0); -- the one read in the clock before
   signal last_cell : unsigned(C_ADDR_W - 1 downto 0); -- of the tile
-  signal plane     : unsigned(C_PLANE_W - 1 downto 0);
-  signal plane_before : unsigned(C_PLANE_W - 1 downto 0); -- plane - 1
-  signal first     : std_logic;                        -- plane 0
+  signal plane_set : unsigned(C_SET_W - 1 downto 0);
+  signal set_before : unsigned(C_SET_W - 1 downto 0); -- plane_set - 1
+  signal first     : std_logic;                        -- set 0
   signal raddr     : std_logic_vector(C_ADDR_W - 1 downto 0);
   signal word      : std_logic_vector(C_WORD_W - 1 downto 0);
 
@@ -89,43 +96,37 @@ architecture rtl of updating is
   signal word_local_max  : std_logic;
   signal word_prev_valid : std_logic;
 
-  -- s1: V and its plane, while the map is read
+  -- s1: V of all lanes, while the map is read.
   signal s1_valid    : std_logic;
   signal s1_last     : std_logic;
-  signal s1_inside   : std_logic;
-  signal s1_textured : std_logic;
-  signal s1_v        : unsigned(G_MNCC_W - 1 downto 0);
+  signal s1_on       : std_logic_vector(G_LANES - 1 downto 0);
+  signal s1_inside   : std_logic_vector(G_LANES - 1 downto 0);
+  signal s1_textured : std_logic_vector(G_LANES - 1 downto 0);
+  signal s1_v        : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
   signal s1_first    : std_logic;
-  signal s1_plane    : unsigned(C_PLANE_W - 1 downto 0);
-  signal s1_before   : unsigned(C_PLANE_W - 1 downto 0);
+  signal s1_set      : unsigned(C_SET_W - 1 downto 0);
+  signal s1_before   : unsigned(C_SET_W + C_LANE_W - 1 downto 0); -- the plane before lane 0's
 
-  -- s2: the stored word, empty at plane 0
-  signal s2_valid      : std_logic;
-  signal s2_last       : std_logic;
-  signal s2_inside     : std_logic;
-  signal s2_textured   : std_logic;
-  signal s2_v          : unsigned(G_MNCC_W - 1 downto 0);
-  signal s2_now        : unsigned(C_PLANE_W - 1 downto 0);
-  signal s2_best       : unsigned(G_MNCC_W - 1 downto 0);
-  signal s2_prev       : unsigned(G_MNCC_W - 1 downto 0);
-  signal s2_plane      : unsigned(C_PLANE_W - 1 downto 0);
-  signal s2_frac       : std_logic_vector(G_FRAC_W - 1 downto 0);
-  signal s2_local_max  : std_logic;
-  signal s2_prev_valid : std_logic;
-  signal s2_is_before  : std_logic; -- the stored plane is the one before this one
-  signal s2_better     : std_logic;
-  signal s2_won        : std_logic; -- there is a winner
-  signal s2_adjacent   : std_logic; -- and it is the plane before this one
+  -- One stage per lane from s2 on. Of each signal element n enters the stage of lane n, and element G_LANES is s3, the
+  -- word to be written but for its fraction: 2 best, prev, flags; the last parabola's operands best - prev and
+  -- 2 best - prev - v, and whether there is one.
+  signal way_in_valid  : std_logic_vector(G_LANES downto 0);
+  signal way_in_last   : std_logic_vector(G_LANES downto 0);
+  signal way_set       : std_logic_vector((G_LANES + 1) * C_SET_W - 1 downto 0);
+  signal way_best      : std_logic_vector((G_LANES + 1) * G_MNCC_W - 1 downto 0);
+  signal way_prev      : std_logic_vector((G_LANES + 1) * G_MNCC_W - 1 downto 0);
+  signal way_plane     : std_logic_vector((G_LANES + 1) * C_PLANE_W - 1 downto 0);
+  signal way_frac      : std_logic_vector((G_LANES + 1) * G_FRAC_W - 1 downto 0);
+  signal way_local_max : std_logic_vector(G_LANES downto 0);
+  signal way_prev_ok   : std_logic_vector(G_LANES downto 0);
+  signal way_before    : std_logic_vector(G_LANES downto 0); -- the best plane is the one before this lane's
+  signal way_parabola  : std_logic_vector(G_LANES downto 0);
+  signal way_rise      : std_logic_vector((G_LANES + 1) * G_MNCC_W - 1 downto 0);
+  signal way_both      : std_logic_vector((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto 0);
 
-  -- s3: the new word but for its fraction; operands of the parabola, a = best - prev and a + c = 2 best - prev - v
-  signal s3_valid    : std_logic;
-  signal s3_last     : std_logic;
-  signal s3_parabola : std_logic; -- the fraction comes from the divider
-  signal s3_word     : std_logic_vector(C_WORD_W - 1 downto 0);
-  signal s3_rise     : unsigned(G_MNCC_W - 1 downto 0);
-  signal s3_both     : unsigned(G_MNCC_W downto 0);
-  signal s3_num      : std_logic_vector(G_MNCC_W + 1 downto 0);
-  signal s3_wait     : std_logic_vector(C_WAIT_W - 1 downto 0);
+  signal s3_word : std_logic_vector(C_WORD_W - 1 downto 0);
+  signal s3_num  : std_logic_vector(G_MNCC_W + 1 downto 0);
+  signal s3_wait : std_logic_vector(C_WAIT_W - 1 downto 0);
 
   -- Behind the divider, and the write.
   signal way_valid  : std_logic_vector(G_FRAC_W downto 0);
@@ -163,6 +164,10 @@ begin
     report "updating: G_FRAC_W=" & integer'image(G_FRAC_W) & " outside 2..12"
     severity failure;
 
+  assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
+    report "updating: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    severity failure;
+
   clear <= rst or cancel or start;
 
   -- Map --------------------------------------------------------------------------------------------------------------
@@ -194,12 +199,12 @@ begin
   begin
     if rising_edge(clk) then
       held_cell <= unsigned(raddr);
-      if s_valid = '1' then
+      if s_valid(0) = '1' then
         if s_last = '1' then
           read_cell <= (others => '0');
           last_cell <= read_cell;
-          plane_before <= plane;
-          plane     <= plane + 1;
+          set_before <= plane_set;
+          plane_set <= plane_set + 1;
           first     <= '0';
         else
           read_cell <= read_cell + 1;
@@ -213,7 +218,7 @@ begin
       end if;
       if clear = '1' then
         read_cell <= (others => '0');
-        plane     <= (others => '0');
+        plane_set <= (others => '0');
         first     <= '1';
       end if;
       if rst = '1' then
@@ -223,95 +228,193 @@ begin
   end process p_read;
 
   -- Update -----------------------------------------------------------------------------------------------------------
-  s2_better   <= s2_inside and to_bit(s2_v > s2_best);
-  s2_won      <= to_bit(s2_best /= 0);
-  s2_adjacent <= s2_won and s2_is_before;
-
-  p_update : process (clk)
-    variable v_best       : unsigned(G_MNCC_W - 1 downto 0);
-    variable v_prev       : unsigned(G_MNCC_W - 1 downto 0);
-    variable v_plane      : unsigned(C_PLANE_W - 1 downto 0);
-    variable v_frac       : std_logic_vector(G_FRAC_W - 1 downto 0);
-    variable v_local_max  : std_logic;
-    variable v_prev_valid : std_logic;
+  p_first : process (clk)
   begin
     if rising_edge(clk) then
-      -- s1: V of a window that is not inside counts as 0
-      s1_valid    <= s_valid;
+      s1_valid    <= s_valid(0);
       s1_last     <= s_last;
+      s1_on       <= s_valid;
       s1_inside   <= s_inside;
       s1_textured <= s_textured;
-      s1_v        <= unsigned(s_v);
-      if s_inside = '0' then
-        s1_v <= (others => '0');
-      end if;
-      s1_first  <= first;
-      s1_plane  <= plane;
-      s1_before <= plane_before;
-      -- s2
-      s2_valid      <= s1_valid;
-      s2_last       <= s1_last;
-      s2_inside     <= s1_inside;
-      s2_textured   <= s1_textured;
-      s2_v          <= s1_v;
-      s2_now        <= s1_plane;
-      s2_best       <= unsigned(word_best);
-      s2_prev       <= unsigned(word_prev);
-      s2_plane      <= unsigned(word_plane);
-      s2_frac       <= word_frac;
-      s2_local_max  <= word_local_max;
-      s2_prev_valid <= word_prev_valid;
-      s2_is_before  <= to_bit(unsigned(word_plane) = s1_before);
-      if s1_first = '1' then
-        s2_best       <= (others => '0');
-        s2_prev       <= (others => '0');
-        s2_plane      <= (others => '0');
-        s2_frac       <= (others => '0');
-        s2_local_max  <= '0';
-        s2_prev_valid <= '0';
-        s2_is_before  <= '0';
-      end if;
-      -- s3
-      v_best       := s2_best;
-      v_prev       := s2_v;
-      v_plane      := s2_plane;
-      v_frac       := s2_frac;
-      v_local_max  := s2_local_max;
-      v_prev_valid := s2_inside;
-      if s2_better = '1' then
-        v_best       := s2_v;
-        v_prev       := s2_prev; -- holds V of the plane before, unless that was the winner
-        v_prev_valid := s2_prev_valid;
-        if s2_adjacent = '1' then
-          v_prev       := s2_best;
-          v_prev_valid := '1';
+      s1_v        <= s_v;
+      for n in 0 to G_LANES - 1 loop
+        if s_inside(n) = '0' then -- V of a window that is not inside counts as 0
+          s1_v((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W) <= (others => '0');
         end if;
-        v_plane     := s2_now;
-        v_frac      := (others => '0');
-        v_local_max := '0';
-      elsif s2_adjacent = '1' then
-        v_local_max := s2_inside and s2_prev_valid;
-      elsif s2_won = '0' then
-        v_frac(0) := s2_frac(0) or s2_inside;
-        v_frac(1) := s2_frac(1) or s2_textured;
+      end loop;
+      s1_first <= first;
+      s1_set   <= plane_set;
+      -- The last plane of the set before: all lane bits are ones.
+      s1_before(C_SET_W + C_LANE_W - 1 downto C_LANE_W) <= set_before;
+      for k in 0 to C_LANE_W - 1 loop
+        s1_before(k) <= '1';
+      end loop;
+      -- s2: the stored word, empty at set 0
+      way_in_valid(0)                      <= s1_valid;
+      way_in_last(0)                       <= s1_last;
+      way_set(C_SET_W - 1 downto 0)        <= std_logic_vector(s1_set);
+      way_best(G_MNCC_W - 1 downto 0)      <= word_best;
+      way_prev(G_MNCC_W - 1 downto 0)      <= word_prev;
+      way_plane(C_PLANE_W - 1 downto 0)    <= word_plane;
+      way_frac(G_FRAC_W - 1 downto 0)      <= word_frac;
+      way_local_max(0)                     <= word_local_max;
+      way_prev_ok(0)                       <= word_prev_valid;
+      way_before(0)                        <= to_bit(unsigned(word_plane) = resize(s1_before, C_PLANE_W));
+      if s1_first = '1' then
+        way_best(G_MNCC_W - 1 downto 0)    <= (others => '0');
+        way_prev(G_MNCC_W - 1 downto 0)    <= (others => '0');
+        way_plane(C_PLANE_W - 1 downto 0)  <= (others => '0');
+        way_frac(G_FRAC_W - 1 downto 0)    <= (others => '0');
+        way_local_max(0)                   <= '0';
+        way_prev_ok(0)                     <= '0';
+        way_before(0)                      <= '0';
       end if;
-      s3_valid    <= s2_valid;
-      s3_last     <= s2_last;
-      s3_parabola <= s2_adjacent and not s2_better;
-      s3_word     <= std_logic_vector(v_best) & std_logic_vector(v_prev) & std_logic_vector(v_plane) & v_frac
-                     & v_local_max & v_prev_valid;
-      s3_rise     <= s2_best - s2_prev;
-      s3_both     <= (s2_best & '0') - resize(s2_prev, G_MNCC_W + 1) - resize(s2_v, G_MNCC_W + 1);
       if rst = '1' or cancel = '1' then
-        s1_valid <= '0';
-        s2_valid <= '0';
-        s3_valid <= '0';
+        s1_valid        <= '0';
+        way_in_valid(0) <= '0';
       end if;
     end if;
-  end process p_update;
+  end process p_first;
 
-  s3_num  <= "00" & std_logic_vector(s3_rise);
-  s3_wait <= s3_parabola & s3_word;
+  way_parabola(0)                        <= '0';
+  way_rise(G_MNCC_W - 1 downto 0)        <= (others => '0');
+  way_both(G_MNCC_W downto 0)            <= (others => '0');
+
+  g_lane : for n in 0 to G_LANES - 1 generate
+    -- What the lane brings waits n + 1 clocks for its turn: sideband is {on, inside, textured, v}.
+    constant C_SIDE_W : integer := G_MNCC_W + 3;
+    signal side       : std_logic_vector((n + 1) * C_SIDE_W - 1 downto 0);
+    signal on_q       : std_logic;
+    signal inside     : std_logic;
+    signal textured   : std_logic;
+    signal v          : unsigned(G_MNCC_W - 1 downto 0);
+    signal plane_now  : unsigned(C_SET_W + C_LANE_W - 1 downto 0);
+    signal set_now    : std_logic_vector(C_SET_W - 1 downto 0);
+    -- The cell as it comes, and as it goes.
+    signal old_best      : unsigned(G_MNCC_W - 1 downto 0);
+    signal old_prev      : unsigned(G_MNCC_W - 1 downto 0);
+    signal old_plane     : std_logic_vector(C_PLANE_W - 1 downto 0);
+    signal old_frac      : std_logic_vector(G_FRAC_W - 1 downto 0);
+    signal old_rise      : std_logic_vector(G_MNCC_W - 1 downto 0);
+    signal old_both      : std_logic_vector(G_MNCC_W downto 0);
+    signal better        : std_logic;
+    signal won           : std_logic; -- there is a winner
+    signal adjacent      : std_logic; -- and it is the plane before this one
+    signal new_best      : unsigned(G_MNCC_W - 1 downto 0);
+    signal new_prev      : unsigned(G_MNCC_W - 1 downto 0);
+    signal new_plane     : std_logic_vector(C_PLANE_W - 1 downto 0);
+    signal new_frac      : std_logic_vector(G_FRAC_W - 1 downto 0);
+    signal new_rise      : std_logic_vector(G_MNCC_W - 1 downto 0);
+    signal new_both      : std_logic_vector(G_MNCC_W downto 0);
+    signal new_local_max : std_logic;
+    signal new_prev_ok   : std_logic;
+    signal new_before    : std_logic;
+    signal new_parabola  : std_logic;
+    signal new_valid     : std_logic;
+    signal new_last      : std_logic;
+    signal new_set       : std_logic_vector(C_SET_W - 1 downto 0);
+  begin
+
+    p_side : process (clk)
+    begin
+      if rising_edge(clk) then
+        side(C_SIDE_W - 1 downto 0) <= s1_on(n) & s1_inside(n) & s1_textured(n)
+                                       & s1_v((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W);
+        for k in 1 to n loop
+          side((k + 1) * C_SIDE_W - 1 downto k * C_SIDE_W) <= side(k * C_SIDE_W - 1 downto (k - 1) * C_SIDE_W);
+        end loop;
+      end if;
+    end process p_side;
+
+    v        <= unsigned(side(n * C_SIDE_W + G_MNCC_W - 1 downto n * C_SIDE_W));
+    textured <= side(n * C_SIDE_W + G_MNCC_W);
+    inside   <= side(n * C_SIDE_W + G_MNCC_W + 1);
+    on_q     <= to_bit(n = 0) or side(n * C_SIDE_W + G_MNCC_W + 2);
+
+    set_now   <= way_set((n + 1) * C_SET_W - 1 downto n * C_SET_W);
+    plane_now <= shift_left(resize(unsigned(set_now), C_SET_W + C_LANE_W), C_LANE_W) + n;
+    old_best  <= unsigned(way_best((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W));
+    old_prev  <= unsigned(way_prev((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W));
+    old_plane <= way_plane((n + 1) * C_PLANE_W - 1 downto n * C_PLANE_W);
+    old_frac  <= way_frac((n + 1) * G_FRAC_W - 1 downto n * G_FRAC_W);
+    old_rise  <= way_rise((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W);
+    old_both  <= way_both((n + 1) * (G_MNCC_W + 1) - 1 downto n * (G_MNCC_W + 1));
+
+    better   <= inside and to_bit(v > old_best) and on_q;
+    won      <= to_bit(old_best /= 0);
+    adjacent <= won and way_before(n) and on_q;
+
+    p_update : process (clk)
+    begin
+      if rising_edge(clk) then
+        new_valid    <= way_in_valid(n);
+        new_last     <= way_in_last(n);
+        new_set      <= set_now;
+        new_before   <= better;
+        new_best     <= old_best;
+        new_prev     <= old_prev;
+        new_prev_ok  <= way_prev_ok(n);
+        new_plane    <= old_plane;
+        new_frac     <= old_frac;
+        new_local_max <= way_local_max(n);
+        if better = '1' then
+          new_best <= v;
+          -- prev holds V of the plane before, unless that was the winner
+          if adjacent = '1' then
+            new_prev    <= old_best;
+            new_prev_ok <= '1';
+          end if;
+          new_plane     <= std_logic_vector(resize(plane_now, C_PLANE_W));
+          new_frac      <= (others => '0');
+          new_local_max <= '0';
+        elsif on_q = '1' then
+          new_prev    <= v;
+          new_prev_ok <= inside;
+          if adjacent = '1' then
+            new_local_max <= inside and way_prev_ok(n);
+          elsif won = '0' then
+            new_frac(0) <= old_frac(0) or inside;
+            new_frac(1) <= old_frac(1) or textured;
+          end if;
+        end if;
+        -- Without a parabola the operands mean nothing: the first lane need not choose.
+        if n = 0 or adjacent = '1' then
+          new_rise <= std_logic_vector(old_best - old_prev);
+          new_both <= std_logic_vector((old_best & '0') - resize(old_prev, G_MNCC_W + 1) - resize(v, G_MNCC_W + 1));
+        else
+          new_rise <= old_rise;
+          new_both <= old_both;
+        end if;
+        new_parabola <= (way_parabola(n) or adjacent) and not better;
+        if rst = '1' or cancel = '1' then
+          new_valid <= '0';
+        end if;
+      end if;
+    end process p_update;
+
+    way_in_valid(n + 1)  <= new_valid;
+    way_in_last(n + 1)   <= new_last;
+    way_before(n + 1)    <= new_before;
+    way_local_max(n + 1) <= new_local_max;
+    way_prev_ok(n + 1)   <= new_prev_ok;
+    way_parabola(n + 1)  <= new_parabola;
+    way_set((n + 2) * C_SET_W - 1 downto (n + 1) * C_SET_W)                 <= new_set;
+    way_best((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W)              <= std_logic_vector(new_best);
+    way_prev((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W)              <= std_logic_vector(new_prev);
+    way_plane((n + 2) * C_PLANE_W - 1 downto (n + 1) * C_PLANE_W)           <= new_plane;
+    way_frac((n + 2) * G_FRAC_W - 1 downto (n + 1) * G_FRAC_W)              <= new_frac;
+    way_rise((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W)              <= new_rise;
+    way_both((n + 2) * (G_MNCC_W + 1) - 1 downto (n + 1) * (G_MNCC_W + 1))  <= new_both;
+
+  end generate g_lane;
+
+  s3_word <= way_best((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W)
+             & way_prev((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W)
+             & way_plane((G_LANES + 1) * C_PLANE_W - 1 downto G_LANES * C_PLANE_W)
+             & way_frac((G_LANES + 1) * G_FRAC_W - 1 downto G_LANES * G_FRAC_W)
+             & way_local_max(G_LANES) & way_prev_ok(G_LANES);
+  s3_num  <= "00" & way_rise((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W);
+  s3_wait <= way_parabola(G_LANES) & s3_word;
 
   u_divider : entity work.divider
     generic map (
@@ -321,7 +424,7 @@ begin
     port map (
       clk    => clk,
       s_num  => s3_num,
-      s_den  => std_logic_vector(s3_both),
+      s_den  => way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1)),
       m_quot => quot
     );
 
@@ -340,8 +443,8 @@ begin
   p_write : process (clk)
   begin
     if rising_edge(clk) then
-      way_valid  <= way_valid(G_FRAC_W - 1 downto 0) & s3_valid;
-      way_last   <= way_last(G_FRAC_W - 1 downto 0) & s3_last;
+      way_valid  <= way_valid(G_FRAC_W - 1 downto 0) & way_in_valid(G_LANES);
+      way_last   <= way_last(G_FRAC_W - 1 downto 0) & way_in_last(G_LANES);
       write_word <= waited(C_WORD_W - 1 downto 0);
       if waited(C_WORD_W) = '1' then
         write_word(G_FRAC_W + 1 downto 2) <= quot;

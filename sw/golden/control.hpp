@@ -44,7 +44,7 @@ constexpr int kStorageLatency = 4;
 constexpr int kInterpolationLatency = 6;
 
 inline int similarity_latency(const Config& c) { return 16 + c.mncc_bits; }
-inline int updating_latency(const Config& c) { return 4 + c.frac_bits; }
+inline int updating_latency(const Config& c) { return 3 + c.lanes + c.frac_bits; }
 // The start command, the last plane noticed in the map, the unload command and the first word out of the map.
 constexpr int kControlClocks = 4;
 
@@ -52,9 +52,11 @@ constexpr int kControlClocks = 4;
 // other, and the pipeline is filled once. engine_clocks() is what port tile_clocks shows: from the start command to the
 // last map beat. The padding of the last row does not count, since nobody waits for it.
 inline uint64_t load_clocks(const TileJob& t) { return static_cast<uint64_t>(t.win_cols) * t.win_rows; }
+// Lanes sweep a set of planes at once; in the last one some may rest.
+inline int plane_sets(const Config& c, const TileJob& t) { return (t.planes + c.lanes - 1) / c.lanes; }
 inline uint64_t sweep_clocks(const Config& c, const TileJob& t) {
   const int row = std::max(sweep_cols(c, t), kRowMin);
-  return static_cast<uint64_t>(t.planes) * sweep_rows(c, t) * row - (row - sweep_cols(c, t));
+  return static_cast<uint64_t>(plane_sets(c, t)) * sweep_rows(c, t) * row - (row - sweep_cols(c, t));
 }
 inline uint64_t unload_clocks(const TileJob& t) { return static_cast<uint64_t>(t.tile_cols) * t.tile_rows; }
 inline uint64_t fill_clocks(const Config& c) {

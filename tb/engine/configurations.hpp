@@ -5,6 +5,8 @@
 #include <string>
 
 #include "Vpsweep_odd.h"
+#include "Vpsweep_odd_2.h"
+#include "Vpsweep_odd_4.h"
 #include "Vpsweep_tiny.h"
 #include "rtl/rtl_engine.hpp"
 
@@ -23,6 +25,15 @@ struct Tiny {
 struct Odd {
   using Dut = Vpsweep_odd;
   static golden::Config config() { return configuration("odd").config; }
+};
+
+struct Odd2 {
+  using Dut = Vpsweep_odd_2;
+  static golden::Config config() { return configuration("odd_2").config; }
+};
+struct Odd4 {
+  using Dut = Vpsweep_odd_4;
+  static golden::Config config() { return configuration("odd_4").config; }
 };
 
 }  // namespace psweep::tb

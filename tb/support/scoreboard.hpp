@@ -65,6 +65,7 @@ class Scoreboard {
   size_t compared() const { return compared_; }
   size_t outstanding() const { return expected_.size(); }
   size_t errors() const { return errors_; }
+  bool untouched() const { return errors_ == 0 && expected_.empty() && compared_ == 0; }
   bool ok() const { return errors_ == 0 && expected_.empty() && compared_ > 0; }
   std::string report() const {
     std::ostringstream text;

@@ -6,6 +6,9 @@
 
 #include "Vupdating_a.h"
 #include "Vupdating_b.h"
+#include "Vupdating_c.h"
+#include "Vupdating_d.h"
+#include "Vupdating_e.h"
 #include "golden/control.hpp"
 #include "golden/updating.hpp"
 #include "support/catch.hpp"
@@ -33,8 +36,8 @@ struct Bench : Agent {
   double stall = 0;
   int tile = 0;
 
-  Bench(int planes, int mncc_bits, int frac_bits) {
-    config.planes = planes, config.mncc_bits = mncc_bits, config.frac_bits = frac_bits;
+  Bench(int planes, int mncc_bits, int frac_bits, int lanes) {
+    config.planes = planes, config.mncc_bits = mncc_bits, config.frac_bits = frac_bits, config.lanes = lanes;
     dut.start = dut.cancel = dut.unload = dut.s_valid = dut.m_tready = 0;
     sim.add(*this);
     sim.reset();
@@ -99,16 +102,25 @@ struct Bench : Agent {
     sim.tick();
     dut.start = 0;
     sim.run(3);
-    for (int k = 0; k < planes; ++k) {
+    for (int k = 0; k < planes; k += config.lanes) {
       for (int n = 0; n < cells; ++n) {
-        const golden::Similarity s = value(kind);
-        map[n] = golden::update(config, map[n], k, s);
-        dut.s_valid = 1;
+        // The planes of a set come at once; lanes beyond the last plane rest, whatever else their wires show.
+        uint64_t valid = 0, inside = 0, textured = 0, v = 0;
+        for (int lane = 0; lane < config.lanes; ++lane) {
+          const golden::Similarity s = value(kind);
+          const bool on = k + lane < planes;
+          if (on) map[n] = golden::update(config, map[n], k + lane, s);
+          valid |= uint64_t{on} << lane;
+          inside |= uint64_t{s.valid} << lane;
+          textured |= uint64_t{s.textured} << lane;
+          // V of a window outside must not matter.
+          v |= static_cast<uint64_t>(s.valid ? s.v : below(2)) << lane * config.mncc_bits;
+        }
+        dut.s_valid = static_cast<CData>(valid);
         dut.s_last = n == cells - 1;
-        dut.s_inside = s.valid;
-        dut.s_textured = s.textured;
-        // V of a window outside must not matter.
-        dut.s_v = static_cast<std::remove_reference_t<decltype(dut.s_v)>>(s.valid ? s.v : below(2));
+        dut.s_inside = static_cast<CData>(inside);
+        dut.s_textured = static_cast<CData>(textured);
+        dut.s_v = static_cast<std::remove_reference_t<decltype(dut.s_v)>>(v);
         expected_words.push_back(map[n]);
         expected_writes.emplace_back(sim.cycle() + static_cast<uint64_t>(golden::updating_latency(config)),
                                      Place{tile, k, n, 0});
@@ -126,8 +138,8 @@ struct Bench : Agent {
     dut.threshold = static_cast<std::remove_reference_t<decltype(dut.threshold)>>(threshold);
     planes_done = unloads_done = 0;
     const auto map = sweep(cells, planes, kind, below(2) ? 5 : 0);
-    sim.run(static_cast<uint64_t>(8 + config.frac_bits));
-    CHECK(planes_done == static_cast<uint64_t>(planes));
+    sim.run(static_cast<uint64_t>(8 + config.lanes + config.frac_bits));
+    CHECK(planes_done == static_cast<uint64_t>((planes + config.lanes - 1) / config.lanes));
     for (const auto& c : map) expected_beats.push_back(golden::unload(c, threshold));
     left = map.size();
     dut.unload = 1;
@@ -152,9 +164,9 @@ struct Bench : Agent {
 };
 
 template <class Dut>
-void run_format(int planes, int cells, int mncc_bits, int frac_bits) {
+void run_format(int planes, int cells, int mncc_bits, int frac_bits, int lanes = 1) {
   INFO("seed " << test_seed() << " planes " << planes << " cells " << cells);
-  Bench<Dut> bench(planes, mncc_bits, frac_bits);
+  Bench<Dut> bench(planes, mncc_bits, frac_bits, lanes);
   const int top = (1 << mncc_bits) - 1;
   for (int kind = 0; kind < 4; ++kind)
     for (const double stall : {0.0, 0.5, 0.9}) {
@@ -171,9 +183,13 @@ void run_format(int planes, int cells, int mncc_bits, int frac_bits) {
 TEST_CASE("updating: 13-bit V, 8-bit fraction") { run_format<Vupdating_a>(37, 29, 13, 8); }
 TEST_CASE("updating: 4-bit V, 12-bit fraction, plane count a power of two") { run_format<Vupdating_b>(16, 64, 4, 12); }
 
+TEST_CASE("updating: two planes at once") { run_format<Vupdating_c>(37, 29, 13, 8, 2); }
+TEST_CASE("updating: four planes at once, few bits, more ties") { run_format<Vupdating_d>(18, 23, 5, 12, 4); }
+TEST_CASE("updating: four planes at once, at most three of them there") { run_format<Vupdating_e>(3, 7, 8, 2, 4); }
+
 TEST_CASE("updating: abort in sweep and in unload, the next tile is right") {
   INFO("seed " << test_seed());
-  Bench<Vupdating_a> bench(37, 13, 8);
+  Bench<Vupdating_a> bench(37, 13, 8, 1);
   bench.stall = 0.5;
   for (int wait = 0; wait < 40; wait += 3) {
     const auto map = bench.sweep(11, 4, 0, 0);
