@@ -4,10 +4,10 @@
 # NAME: a-z, 0-9, _. All others are numbers; what is not given (or empty) comes from the defaults below. IMG_COLS and
 # IMG_ROWS default to the largest tile with its skirt, plus 2 for interpolation, plus DISPARITY columns (half of the
 # difference between the disparities of the nearest and the farthest plane).
-set(keys PLANE_COLS PLANE_ROWS PLANES WINDOW PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS)
-set(defaults 256 130 301 13 8 8 2 13 8)
-set(lowest 1 1 1 3 1 1 0 4 2)
-set(highest 4096 4096 1024 21 12 12 8 16 12)
+set(keys PLANE_COLS PLANE_ROWS PLANES WINDOW PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS LANES)
+set(defaults 256 130 301 13 8 8 2 13 8 1)
+set(lowest 1 1 1 3 1 1 0 4 2 1)
+set(highest 4096 4096 1024 21 12 12 8 16 12 4)
 
 if(NOT DIR)
   message(FATAL_ERROR "make_config: DIR=<folder> is missing")
@@ -31,6 +31,9 @@ endforeach()
 math(EXPR odd "${WINDOW} % 2")
 if(NOT odd)
   message(FATAL_ERROR "make_config: WINDOW=${WINDOW} is even")
+endif()
+if(LANES EQUAL 3)
+  message(FATAL_ERROR "make_config: LANES=3 is not 1, 2 or 4")
 endif()
 if("${DISPARITY}" STREQUAL "")
   set(DISPARITY 90)
@@ -56,7 +59,7 @@ file(
   \"description\": \"added by make config\",
   \"img_cols\": ${IMG_COLS}, \"img_rows\": ${IMG_ROWS}, \"plane_cols\": ${PLANE_COLS}, \"plane_rows\": ${PLANE_ROWS},
   \"planes\": ${PLANES}, \"window\": ${WINDOW}, \"pix_bits\": ${PIX_BITS}, \"weight_bits\": ${WEIGHT_BITS},
-  \"interp_frac\": ${INTERP_FRAC}, \"mncc_bits\": ${MNCC_BITS}, \"frac_bits\": ${FRAC_BITS}, \"lanes\": 1,
+  \"interp_frac\": ${INTERP_FRAC}, \"mncc_bits\": ${MNCC_BITS}, \"frac_bits\": ${FRAC_BITS}, \"lanes\": ${LANES},
   \"waves\": false
 }
 ")

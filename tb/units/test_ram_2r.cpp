@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// ram_2r, depth no power of two: both ports return what was written last, two clocks after the address, while the first
+// one writes now and then. Words read in the clock in which they are written are undefined and not compared.
+#include <array>
+#include <deque>
+#include <random>
+#include <vector>
+
+#include "Vram_2r_a.h"
+#include "support/catch.hpp"
+#include "support/scoreboard.hpp"
+
+using namespace psweep;
+using namespace psweep::tb;
+
+TEST_CASE("ram_2r: two readers, one of which writes") {
+  constexpr int kDepth = 37;
+  constexpr size_t kLatency = 2;
+  const uint32_t seed = test_seed();
+  INFO("seed " << seed);
+  // The entity has no reset, so it cannot live in Sim.
+  VerilatedContext context;
+  context.randReset(2);
+  context.randSeed(static_cast<int>(seed | 1));
+  Vram_2r_a dut(&context);
+  std::mt19937 random(seed);
+  Scoreboard a("a_rdata"), b("b_rdata");
+
+  struct Read {
+    bool known;
+    uint32_t value;
+  };
+  std::array<std::deque<Read>, 2> pending;
+  std::vector<Read> memory(kDepth, {false, 0});
+  for (uint64_t clock = 0; clock < 20000; ++clock) {
+    const bool we = random() % 3 == 0;
+    const uint32_t a_addr = static_cast<uint32_t>(random()) % kDepth, b_addr = static_cast<uint32_t>(random()) % kDepth;
+    dut.a_we = we;
+    dut.a_addr = static_cast<CData>(a_addr);
+    dut.b_addr = static_cast<CData>(b_addr);
+    dut.a_wdata = static_cast<SData>(random() & 0x1fff);
+    dut.clk = 0;
+    dut.eval();
+    const std::array<uint32_t, 2> shown = {dut.a_rdata, dut.b_rdata};
+    for (size_t port = 0; port < 2; ++port) {
+      if (pending[port].size() < kLatency) continue;
+      const Read want = pending[port].front();
+      pending[port].pop_front();
+      if (want.known) (port == 0 ? a : b).compare(shown[port], want.value, {}, clock);
+    }
+    pending[0].push_back(we ? Read{false, 0} : memory[a_addr]);
+    pending[1].push_back(we && a_addr == b_addr ? Read{false, 0} : memory[b_addr]);
+    if (we) memory[a_addr] = {true, dut.a_wdata};
+    dut.clk = 1;
+    dut.eval();
+  }
+  dut.final();
+  INFO(a.report() << b.report());
+  CHECK((a.ok() && b.ok()));
+  CHECK(a.compared() > 10000);
+  CHECK(b.compared() > 15000);
+}
