@@ -4,8 +4,9 @@
 --              packet is taken as fast as it comes, the sweep runs to its end, and unload waits for its own stream only
 --   States   : idle, load (pixels), sweep (samples), flush (cells on their way to the map), unload, drain (pixels of a
 --              tile that was refused or too long)
---   Sweep    : G_LANES planes at once, a set, then the next set; row after row, one sample a clock and lane; rows of max(sweep_cols, C_ROW_MIN) clocks; the
---              first sample in the clock after the last pixel; no bubble between rows or planes
+--   Sweep    : G_LANES planes at once, a set, then the next set; row after row, one sample a clock and lane; rows of
+--              max(sweep_cols, C_ROW_MIN) clocks; the first sample in the clock after the last pixel; no bubble between
+--              rows or sets
 --   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
 --   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
 --              work the address of a write is not looked at. A last map beat beats an abort in the same clock

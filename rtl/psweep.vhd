@@ -9,8 +9,8 @@
 --               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
 --   Numbers   : docs/numeric_contract.md
 --   Lanes     : G_LANES planes (1, 2 or 4) are swept at once over one image buffer and one map, with the same results
---               bit by bit. address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the low
---               bits. Lane n sweeps planes n, n + G_LANES, n + 2 G_LANES ..; its part of the plane table holds just
+--               bit by bit. address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the
+--               low bits. Lane n sweeps planes n, n + G_LANES, n + 2 G_LANES ..; its part of the plane table holds just
 --               those. Lanes beyond the last plane rest
 --   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
 --   dbg_*     : outputs of the stages for waves and tests; leave open

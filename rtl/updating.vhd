@@ -4,7 +4,7 @@
 --             RAM. Two values of V suffice (the best and the one before it); the fraction of the parabola is computed
 --             when the plane behind the best one comes by, and stored instead of a third.
 --   Rate    : one cell per clock: read, change, write; unload: one cell per clock while m_tready = '1'
---   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage per
+--   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage a
 --             lane in the order of planes, and is written once. Of the parabolas due in a set only the last one counts
 --             (a better V later in the set voids those before it), so there is one divider
 --   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 2 clocks to
