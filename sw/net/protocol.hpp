@@ -91,8 +91,8 @@ enum Counter : int {
   kMapPackets,
 };
 
-// What a tile takes longer in the chip than engine_clocks(): the row buffer's first pair comes 3 clocks after the start,
-// the engine could take it after one.
+// What a tile takes longer in the chip than engine_clocks(): the row buffer's first pair comes 3 clocks after the
+// start, the engine could take it after one.
 constexpr uint64_t kFirstPairClocks = 2;
 
 // Names of the counters in their order; nullptr behind the last.

@@ -209,7 +209,7 @@ TEST_CASE("chip: capability words say what the configuration's file says") {
 }
 
 TEST_CASE("chip: a tiled pair is the model's map, every configuration for tests, one and two tiles in flight") {
-  const char* name = GENERATE("tiny", "tiny_min", "odd");
+  const char* name = GENERATE("tiny", "tiny_min", "odd", "odd_4");
   const int in_flight = GENERATE(1, 2);
   INFO(name << ", in flight " << in_flight);
   const Chip& chip = chip_named(name);
