@@ -72,7 +72,7 @@ entity control is
     m_row_first   : out std_logic; -- i = 0, only with m_valid
     m_plane_first : out std_logic; -- j = 0, for the whole row
     m_plane_last  : out std_logic; -- last sample of the plane
-    m_plane       : out std_logic_vector(clog2((G_PLANES + G_LANES - 1) / G_LANES) - 1 downto 0); -- set
+    m_plane       : out std_logic_vector(clog2(plane_sets(G_PLANES, G_LANES)) - 1 downto 0); -- set
     m_lanes       : out std_logic_vector(G_LANES - 1 downto 0); -- planes set * G_LANES + lane that the tile has
 
     -- Updating.
@@ -104,7 +104,7 @@ architecture rtl of control is
   constant C_ROW_W       : integer := clog2(imax(G_IMG_ROWS, C_SWEEP_ROWS));
   constant C_PLANE_W     : integer := clog2(G_PLANES);
   constant C_LANE_W      : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
-  constant C_SET_W     : integer := clog2((G_PLANES + G_LANES - 1) / G_LANES);
+  constant C_SET_W     : integer := clog2(plane_sets(G_PLANES, G_LANES));
   constant C_TABLE_W     : integer := C_PLANE_W + 3;
   constant C_TABLE_WORDS : integer := 8 * G_PLANES;
   -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, so the pipeline (about 100)

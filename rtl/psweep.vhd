@@ -107,7 +107,7 @@ end entity psweep;
 architecture rtl of psweep is
 
   constant C_LANE_W   : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
-  constant C_SETS     : integer := (G_PLANES + G_LANES - 1) / G_LANES;
+  constant C_SETS     : integer := plane_sets(G_PLANES, G_LANES);
   constant C_SET_W    : integer := clog2(C_SETS);
   constant C_BANK_W   : integer := clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2));
   constant C_SAMPLE_W : integer := G_PIX_W + G_INTERP_F;

@@ -49,6 +49,9 @@ package psweep_pkg is
 
   function imax (a, b : integer) return integer;
 
+  -- Sets of `lanes` planes that are swept one after the other. Illegal numbers are for the assertions.
+  function plane_sets (planes, lanes : integer) return positive;
+
   -- true is '1'
   function to_bit (b : boolean) return std_logic;
 
@@ -82,6 +85,14 @@ package body psweep_pkg is
     end if;
     return b;
   end function imax;
+
+  function plane_sets (planes, lanes : integer) return positive is
+  begin
+    if planes < 1 or lanes < 1 then
+      return 1;
+    end if;
+    return (planes + lanes - 1) / lanes;
+  end function plane_sets;
 
   function to_bit (b : boolean) return std_logic is
   begin

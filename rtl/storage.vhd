@@ -86,7 +86,7 @@ architecture rtl of storage is
   constant C_DEPTH  : integer := G_IMG_COLS / 2 * (G_IMG_ROWS / 2);
   constant C_BANK_W : integer := clog2(C_DEPTH);
   constant C_COL_W  : integer := clog2(G_IMG_COLS);
-  constant C_COPIES : integer := (G_LANES + 1) / 2;
+  constant C_COPIES : integer := G_LANES / 2;
 
   -- Load.
   signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row pair being loaded

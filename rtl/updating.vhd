@@ -70,7 +70,7 @@ architecture rtl of updating is
   constant C_ADDR_W  : integer := clog2(G_CELLS);
   constant C_PLANE_W : integer := clog2(G_PLANES);
   constant C_LANE_W  : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
-  constant C_SET_W   : integer := clog2((G_PLANES + G_LANES - 1) / G_LANES);
+  constant C_SET_W   : integer := clog2(plane_sets(G_PLANES, G_LANES));
   constant C_WORD_W  : integer := 2 * G_MNCC_W + C_PLANE_W + G_FRAC_W + 2;
   constant C_DATA_W  : integer := 4 + C_PLANE_W + G_FRAC_W + G_MNCC_W;
   -- What a cell takes along while its fraction is computed: the word, and whether to take the quotient.
