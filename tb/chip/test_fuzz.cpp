@@ -16,7 +16,7 @@
 //   Not compared: the token of a new session (learned from the chip, must differ from the one before); in a reply that
 //             is made while the engine takes or gives up its rows or unloads, what moves then (status words 0 to 2, 4
 //             to 6, 8 and the bitmap, but not the tile numbers, table or code); during a sweep error bits and window
-//             errors, which the model knows only for whole tiles; tile_clocks of a tile that was dropped or had to wait
+//             errors, which the model knows only for whole tiles; tile_clocks of a tile that had to wait
 //             (its stalls are those of the wire). Counters 24 and 25 (waiting, in 256 clocks) have a tolerance of 10
 //             and 2 more per begin or end of waiting: the model does not know how long a message takes inside
 //   Time    : frames come while the engine is at rest, held up or in the middle of a sweep; the model's clock is the
@@ -300,11 +300,18 @@ class Fuzz {
       message_arrives(m, peer);
     }
   }
+  // tile_clocks shown are those of the latest tile that was done.
+  void note_done(uint32_t done) {
+    if (done > done_) shown_slow_ = slow_load_ || done > done_ + 1;
+    done_ = done;
+  }
   void message_arrives(const Bytes& m, const net::Address& peer) {
     const State before = state();
+    note_done(before.done);
     const bool swept = model_.sweeping();
     const std::vector<Bytes> replies = model_.message(m, static_cast<uint32_t>(peers_.size() - 1));
     const State after = state();
+    note_done(after.done);
     watch(before);
     name_message(m, before, after, swept, !replies.empty());
 
@@ -325,7 +332,7 @@ class Fuzz {
       Expected e{golden::transmit(golden::MessageKind::kUdp, own_, peer, reply)};
       e.moment = moving ? Moment::kMoving : model_.sweeping() ? Moment::kSweep : Moment::kRest;
       e.clocks = after.engine == 0 && !moving && model_.clocks_exact();
-      e.at_least = slow_load_;
+      e.at_least = shown_slow_;
       expected_.push_back(std::move(e));
     }
   }
@@ -867,7 +874,8 @@ class Fuzz {
   std::map<std::string, int64_t> classes_;
   std::string place_;
   uint32_t chip_token_ = 0x12345678, model_token_ = 0x9abcdef0;
-  bool learn_ = false, linger_ = false, dirty_ = false, slow_load_ = false, in_round_ = false;
+  bool learn_ = false, linger_ = false, dirty_ = false, slow_load_ = false, shown_slow_ = false, in_round_ = false;
+  uint32_t done_ = 0;
   double sweep_since_ = -1;
   int64_t sent_ = 0, replies_ = 0, pairs_ = 0, waits_changed_ = 0;
   const bool progress_ = number_from("PSWEEP_FUZZ_PROGRESS", 0) != 0;
