@@ -27,7 +27,7 @@
 namespace psweep::golden {
 
 // Inverse of job_writes(): values of the registers net::kJobRegisters, in their order. Of a bound the engine keeps 13
-// bits, of a step 21 (table_entry()); sizes and threshold must fit.
+// bits, of a step along a row 21 (table_entry()); sizes and threshold must fit.
 inline TileJob job_from_words(const std::array<uint32_t, net::kJobWords>& w) {
   auto s = [&w](size_t i) { return static_cast<int32_t>(w[i]); };
   TileJob t;
@@ -41,7 +41,7 @@ inline TileJob job_from_words(const std::array<uint32_t, net::kJobWords>& w) {
 inline PlaneEntry table_entry(const uint32_t* w) {
   auto s = [w](int i) { return static_cast<int32_t>(w[i]); };
   const uint32_t step = (1u << 21) - 1;
-  return {s(0), s(1), s(2), s(3), w[4] & step, w[5] & step, w[6] & step, w[7] & step};
+  return {s(0), s(1), s(2), s(3), w[4] & step, w[5], w[6] & step, w[7]};
 }
 
 class Arbiter {
