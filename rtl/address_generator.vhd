@@ -2,8 +2,8 @@
 -- address_generator: where each sample of a plane lies in both images (paper, section 4.2). Owns the plane table.
 --   Rate     : one sample per clock; rows at least C_ROW_MIN clocks apart
 --   Latency  : C_ADDRESS_LATENCY = 9 clocks from s_* to m_*; no bubble between rows or planes
---   Numbers  : positions sfix(13,19), accumulated modulo 2^32 (exact); steps ufix(2,19): bits above 20 of a word must be
---              0 (those of dx are ignored, those of dy are added); fractions truncated to G_WEIGHT_W bits
+--   Numbers  : positions sfix(13,19), accumulated modulo 2^32 (exact); steps ufix(2,19): bits above 20 of a word must
+--              be 0 (those of dx are ignored, those of dy are added); fractions truncated to G_WEIGHT_W bits
 --   Row      : with the strobe of a row (clock t) the words of that row are fetched, one a clock, in this order:
 --              y0 or dy of both images, x0 of both, dx of both. One 32-bit adder makes all four start values. y parts
 --              (floor, fraction, tests, bank row addresses) are computed once a row and change with its first sample.
