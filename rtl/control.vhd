@@ -104,7 +104,7 @@ architecture rtl of control is
   constant C_ROW_W       : integer := clog2(imax(G_IMG_ROWS, C_SWEEP_ROWS));
   constant C_PLANE_W     : integer := clog2(G_PLANES);
   constant C_LANE_W      : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
-  constant C_SET_W     : integer := clog2(plane_sets(G_PLANES, G_LANES));
+  constant C_SET_W       : integer := clog2(plane_sets(G_PLANES, G_LANES));
   constant C_TABLE_W     : integer := C_PLANE_W + 3;
   constant C_TABLE_WORDS : integer := 8 * G_PLANES;
   -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, so the pipeline (about 100)
@@ -165,10 +165,10 @@ architecture rtl of control is
 
   signal col         : unsigned(C_COL_W - 1 downto 0);
   signal row         : unsigned(C_ROW_W - 1 downto 0);
-  signal plane_set       : unsigned(C_SET_W - 1 downto 0);
+  signal plane_set   : unsigned(C_SET_W - 1 downto 0);
   signal last_wide   : unsigned(C_SET_W + C_PLANE_W + 1 downto 0); -- last_plane, wide enough for any slice
-  signal last_set  : unsigned(C_SET_W - 1 downto 0);
-  signal at_set_end    : std_logic; -- the last one
+  signal last_set    : unsigned(C_SET_W - 1 downto 0);
+  signal at_set_end  : std_logic; -- in the last set
   signal last_col    : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
   signal last_row    : unsigned(C_ROW_W - 1 downto 0);
   signal at_col_end  : std_logic;
@@ -207,9 +207,8 @@ architecture rtl of control is
   signal cfg_event     : std_logic;
   signal tile_event    : std_logic;
   signal new_events    : unsigned(1 downto 0);
-  signal samples_lost  : unsigned(2 downto 0);
+  signal samples_lost  : unsigned(2 downto 0); -- in this clock, over all lanes
   signal sample_lost   : std_logic;
-  signal window_errors_next : unsigned(16 downto 0);
 
   signal error_bits          : std_logic_vector(7 downto 0);
   signal error_count_q       : unsigned(15 downto 0);
@@ -217,6 +216,7 @@ architecture rtl of control is
   signal tiles_done_q        : unsigned(15 downto 0);
   signal tiles_dropped_q     : unsigned(15 downto 0);
   signal window_errors_q     : unsigned(15 downto 0);
+  signal window_errors_next  : unsigned(16 downto 0);
   signal tile_clocks_q       : unsigned(31 downto 0);
 
   -- value + 1, all ones stay.
@@ -399,8 +399,8 @@ begin
   at_row_end  <= to_bit(row = last_row);
   at_last     <= at_col_end and at_row_end;
   last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
-  last_set  <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
-  at_set_end    <= to_bit(plane_set = last_set);
+  last_set    <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
+  at_set_end  <= to_bit(plane_set = last_set);
   at_tile_end <= is_sweep and at_last and at_set_end;
   step        <= pix_fire or is_sweep;
   load_done   <= pix_fire and at_last and s_pix_tlast;
@@ -472,8 +472,8 @@ begin
         plane_set <= plane_set + 1;
       end if;
       if rst = '1' or is_idle = '1' then
-        col   <= (others => '0');
-        row   <= (others => '0');
+        col       <= (others => '0');
+        row       <= (others => '0');
         plane_set <= (others => '0');
       elsif at_tile_end = '1' then
         plane_set <= (others => '0'); -- a legal table address
@@ -545,7 +545,7 @@ begin
     samples_lost <= v_count;
   end process p_lost;
 
-  sample_lost      <= to_bit(samples_lost /= 0);
+  sample_lost        <= to_bit(samples_lost /= 0);
   window_errors_next <= ('0' & window_errors_q) + samples_lost;
   event_window     <= sample_lost and not window_seen;
   cfg_event        <= event_config or event_table or event_address or event_busy;

@@ -3,8 +3,7 @@
 // The chip 'tile' (256 x 130 cells, double buffers) sweeps the first tiles of the paper's pair, 1120 x 1120 pixels and
 // 301 planes, sent by the host library over the in-process link at 100 Mbit/s in full duplex.
 //   busy       the tiles' clocks without any stall (golden/control.hpp), over those from the first launch to the last
-//   map
-//              beat. What is left: waiting for rows, for the map buffer, and for the scheduler
+//              map beat. What is left: waiting for rows, for the map buffer, and for the scheduler
 //   whole pair begin and end as measured; the tiles in between by their own clocks and the stalls measured per tile
 // Usage: link_speed [tiles] [in flight]; default 3 tiles, and 1 and 2 in flight. Exit code 1 if a tile differs from the
 // model or the link broke.
@@ -13,7 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "chip/chip_transport.hpp"
+#include "chip/watched.hpp"
 #include "fast/fast.hpp"
 #include "golden/psweep.hpp"
 #include "net/link_engine.hpp"
@@ -25,43 +24,6 @@ namespace {
 
 const net::Address kHost{{0x02, 0x00, 0x00, 0x00, 0x00, 0x01}, 0x0a050001, 40000};
 constexpr int kSize = 1120, kPlanes = 301;
-
-// Stands between client and wire, and notes when the engine begins and ends.
-class Watched : public ChipTransport {
- public:
-  Watched(Station& station, const net::Address& chip) : ChipTransport(station, chip), desk_(station.desk()) {}
-  std::optional<net::Bytes> receive(double timeout_s) override {
-    const Time end = desk_.now() + to_time(timeout_s);
-    for (;;) {
-      look();
-      const Time left = end - desk_.now();
-      if (left <= 0) return ChipTransport::receive(0);
-      auto packet = ChipTransport::receive(static_cast<double>(std::min(left, kMicrosecond)) / kSecond);
-      if (packet) {
-        look();
-        return packet;
-      }
-    }
-  }
-  Time first_launch = -1, last_busy = -1;
-  int64_t launch_clock = 0, busy_clock = 0;
-
- private:
-  void look() {
-    // To a microsecond.
-    if (first_launch < 0 && desk_.chip().launches() > 0) {
-      first_launch = desk_.now();
-      launch_clock = desk_.clocks();
-    }
-    if (desk_.chip().busy_clocks() != busy_) {
-      last_busy = desk_.now();
-      busy_clock = desk_.clocks();
-    }
-    busy_ = desk_.chip().busy_clocks();
-  }
-  Desk& desk_;
-  int64_t busy_ = 0;
-};
 
 double ms(Time t) { return 1e-12 * static_cast<double>(t); }
 

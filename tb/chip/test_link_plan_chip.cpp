@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "chip/chip_transport.hpp"
+#include "chip/watched.hpp"
 #include "net/link_engine.hpp"
 #include "plan/link_plan.hpp"
 #include "support/catch.hpp"
@@ -16,35 +16,6 @@ using namespace psweep::chip;
 namespace {
 
 const net::Address kHost{{0x02, 0x00, 0x00, 0x00, 0x00, 0x01}, 0x0a050001, 40000};
-
-// Stands between client and wire, and notes when the engine begins and ends, to a microsecond.
-class Watched : public ChipTransport {
- public:
-  Watched(Station& station, const net::Address& chip) : ChipTransport(station, chip), desk_(station.desk()) {}
-  std::optional<net::Bytes> receive(double timeout_s) override {
-    const Time end = desk_.now() + to_time(timeout_s);
-    for (;;) {
-      look();
-      const Time left = end - desk_.now();
-      if (left <= 0) return ChipTransport::receive(0);
-      auto packet = ChipTransport::receive(static_cast<double>(std::min(left, kMicrosecond)) / kSecond);
-      if (packet) {
-        look();
-        return packet;
-      }
-    }
-  }
-  int64_t launch = -1, last_busy = -1;  // clocks
-
- private:
-  void look() {
-    if (launch < 0 && desk_.chip().launches() > 0) launch = desk_.clocks();
-    if (desk_.chip().busy_clocks() != busy_) last_busy = desk_.clocks();
-    busy_ = desk_.chip().busy_clocks();
-  }
-  Desk& desk_;
-  int64_t busy_ = 0;
-};
 
 struct Case {
   const char* chip;
@@ -91,10 +62,10 @@ Measured measure(const Case& k, int tiles, const LinkPlanOptions& o) {
       },
       [](int, const std::vector<golden::MapCell>&) {}, [](uint64_t) {});
   REQUIRE(desk.chip().launches() == tiles);
-  REQUIRE(transport.launch > 0);
+  REQUIRE(transport.launch_clock > 0);
   CHECK(client.statistics().lost == 0);
-  return {static_cast<double>(transport.last_busy - transport.launch), static_cast<double>(figures.engine_clocks),
-          static_cast<double>(client.statistics().duplicates)};
+  return {static_cast<double>(transport.busy_clock - transport.launch_clock),
+          static_cast<double>(figures.engine_clocks), static_cast<double>(client.statistics().duplicates)};
 }
 
 }  // namespace
