@@ -10,7 +10,7 @@ export JOBS VERBOSE T SEED SETUP
 
 # Everything that `make config` passes on to scripts/make_config.cmake.
 CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
-               IMG_COLS IMG_ROWS LANES DISPARITY
+               IMG_COLS IMG_ROWS LANES RECTIFIED DISPARITY
 
 .PHONY: help
 help: ## This list

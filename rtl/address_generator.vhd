@@ -8,6 +8,8 @@
 --              y0 or dy of both images, x0 of both, dx of both. One 32-bit adder makes all four start values. y parts
 --              (floor, fraction, tests, bank row addresses) are computed once a row and change with its first sample.
 --   usable_* : both images, inside and loaded; x and y apart, as x depends on the column only and y on the row only
+--   Rectified: G_RECTIFIED = 1: rows of both images fall on rows of samples. A sample between two rows counts as not
+--              loaded: not usable, and an error of the window if it is inside both images
 --   Table    : 8 words a plane, see docs/interfaces.md; written while no sample is in work
 --   Reset    : clears the strobes on their way and usable_y; positions have no reset
 --   Golden   : sw/golden/address_generator.hpp
@@ -18,10 +20,11 @@ library ieee;
 
 entity address_generator is
   generic (
-    G_PLANES   : integer := 301;
-    G_IMG_COLS : integer := 340;
-    G_IMG_ROWS : integer := 144;
-    G_WEIGHT_W : integer := 8
+    G_PLANES    : integer := 301;
+    G_IMG_COLS  : integer := 340;
+    G_IMG_ROWS  : integer := 144;
+    G_WEIGHT_W  : integer := 8;
+    G_RECTIFIED : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -66,11 +69,11 @@ entity address_generator is
     m_fx_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
     m_fy_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
     -- Bank address of column 0 of the sample's upper and lower neighbours: the even and the odd one of rows yi, yi+1.
-    -- Meaningful where m_usable_y.
-    m_row_even_left  : out std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    m_row_odd_left   : out std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    m_row_even_right : out std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    m_row_odd_right  : out std_logic_vector(clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    -- With G_RECTIFIED both are row yi. Meaningful where m_usable_y.
+    m_row_even_left  : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    m_row_odd_left   : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    m_row_even_right : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    m_row_odd_right  : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
     m_usable_x       : out std_logic;
     m_usable_y       : out std_logic;
     m_window_error   : out std_logic  -- inside both images, not loaded in at least one; only with m_valid
@@ -80,8 +83,8 @@ end entity address_generator;
 architecture rtl of address_generator is
 
   constant C_PITCH  : integer := G_IMG_COLS / 2;
-  constant C_ROW_W  : integer := clog2(G_IMG_ROWS / 2);
-  constant C_BANK_W : integer := clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2));
+  constant C_ROW_W  : integer := clog2(bank_depth(2, G_IMG_ROWS, G_RECTIFIED)); -- of the number of a bank's row
+  constant C_BANK_W : integer := clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED));
 
   -- Sum of v * 2^k over every second set bit k of C_PITCH, beginning with the set bit number `phase`: the sum of both
   -- phases is v * C_PITCH. Two short adder chains, so that neither a multiplier is needed nor a long path.
@@ -171,6 +174,17 @@ architecture rtl of address_generator is
     return std_logic_vector(position(C_POS_FRAC - 1 downto C_POS_FRAC - G_WEIGHT_W));
   end function fraction_of;
 
+  -- Of a usable sample it is 0 anyway with G_RECTIFIED; as a constant it costs no register.
+  function fraction_between_rows (position : unsigned) return std_logic_vector is
+    variable v_fraction : std_logic_vector(G_WEIGHT_W - 1 downto 0);
+  begin
+    v_fraction := (others => '0');
+    if G_RECTIFIED = 0 then
+      v_fraction := fraction_of(position);
+    end if;
+    return v_fraction;
+  end function fraction_between_rows;
+
   -- position <= hi on the truncated position. One more bit stands for "fraction is not 0".
   function at_most (position : unsigned; hi : std_logic_vector) return std_logic is
     variable v_fraction : std_logic;
@@ -206,6 +220,9 @@ begin
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
     report "address_generator: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    severity failure;
+  assert G_RECTIFIED = 0 or G_RECTIFIED = 1
+    report "address_generator: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
     severity failure;
 
   row(0) <= s_row_first;
@@ -299,9 +316,9 @@ begin
   y_lo         <= left_y_lo when row(3) = '1' else right_y_lo;
   y_hi         <= left_y_hi when row(3) = '1' else right_y_hi;
   y_inside_now <= at_least(y_newer, y_lo) and at_most(y_newer, y_hi);
-  y_loaded_now <= is_loaded(y_newer, win_last_row);
+  y_loaded_now <= is_loaded(y_newer, win_last_row) and to_bit(G_RECTIFIED = 0 or unsigned(fraction_of(y_newer)) = 0);
   -- Higher bits are 0 where the sample is loaded.
-  y_half       <= resize(y_newer(C_POS_FRAC + C_ROW_W downto C_POS_FRAC + 1), C_BANK_W);
+  y_half       <= resize(y_newer(C_POS_FRAC + C_ROW_W - G_RECTIFIED downto C_POS_FRAC + 1 - G_RECTIFIED), C_BANK_W);
 
   p_row : process (clk)
   begin
@@ -321,17 +338,17 @@ begin
       end if;
       if row(8) = '1' then
         m_yi_left        <= std_logic_vector(floor_of(y_older));
-        m_fy_left        <= fraction_of(y_older);
+        m_fy_left        <= fraction_between_rows(y_older);
         m_yi_right       <= std_logic_vector(floor_of(y_newer));
-        m_fy_right       <= fraction_of(y_newer);
+        m_fy_right       <= fraction_between_rows(y_newer);
         m_row_odd_left   <= std_logic_vector(row_left);
         m_row_odd_right  <= std_logic_vector(row_now);
         m_row_even_left  <= std_logic_vector(row_left);
         m_row_even_right <= std_logic_vector(row_now);
-        if y_older(C_POS_FRAC) = '1' then
+        if G_RECTIFIED = 0 and y_older(C_POS_FRAC) = '1' then
           m_row_even_left <= std_logic_vector(row_left + C_PITCH);
         end if;
-        if y_newer(C_POS_FRAC) = '1' then
+        if G_RECTIFIED = 0 and y_newer(C_POS_FRAC) = '1' then
           m_row_even_right <= std_logic_vector(row_now + C_PITCH);
         end if;
         out_inside_y <= y_inside;

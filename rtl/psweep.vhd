@@ -5,13 +5,16 @@
 --   Clocks    : from the start command to the last map beat (port tile_clocks), without stalls outside,
 --                 win_cols * win_rows + tile_cols * tile_rows
 --               + ceil(planes / G_LANES) * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
---               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 42 + G_LANES + G_MNCC_W + G_FRAC_W
+--               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 42 + G_LANES + G_MNCC_W + G_FRAC_W - 3 G_RECTIFIED
 --               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
 --   Numbers   : docs/numeric_contract.md
 --   Lanes     : G_LANES planes (1, 2 or 4) are swept at once over one image buffer and one map, with the same results
 --               bit by bit. address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the
 --               low bits. Lane n sweeps planes n, n + G_LANES, n + 2 G_LANES ..; its part of the plane table holds just
 --               those. Lanes beyond the last plane rest
+--   Rectified : G_RECTIFIED = 1 is a smaller build for pairs whose rows correspond: no interpolation between rows, two
+--               banks an image instead of four. Same results where all samples lie on rows of pixels; a sample between
+--               rows counts as not loaded (window error)
 --   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
 --   dbg_*     : outputs of the stages for waves and tests; leave open
 --   Golden    : sw/golden/psweep.hpp
@@ -33,7 +36,8 @@ entity psweep is
     G_INTERP_F   : integer := 2;
     G_MNCC_W     : integer := 13;
     G_FRAC_W     : integer := 8;
-    G_LANES      : integer := 1
+    G_LANES      : integer := 1;
+    G_RECTIFIED  : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -109,7 +113,7 @@ architecture rtl of psweep is
   constant C_LANE_W   : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
   constant C_SETS     : integer := plane_sets(G_PLANES, G_LANES);
   constant C_SET_W    : integer := clog2(C_SETS);
-  constant C_BANK_W   : integer := clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2));
+  constant C_BANK_W   : integer := clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED));
   constant C_SAMPLE_W : integer := G_PIX_W + G_INTERP_F;
 
   signal pipe_rst : std_logic; -- also an abort clears what is on its way
@@ -296,10 +300,11 @@ begin
 
     u_address_generator : entity work.address_generator
       generic map (
-        G_PLANES   => C_SETS,
-        G_IMG_COLS => G_IMG_COLS,
-        G_IMG_ROWS => G_IMG_ROWS,
-        G_WEIGHT_W => G_WEIGHT_W
+        G_PLANES    => C_SETS,
+        G_IMG_COLS  => G_IMG_COLS,
+        G_IMG_ROWS  => G_IMG_ROWS,
+        G_WEIGHT_W  => G_WEIGHT_W,
+        G_RECTIFIED => G_RECTIFIED
       )
       port map (
         clk              => clk,
@@ -349,11 +354,12 @@ begin
 
   u_storage : entity work.storage
     generic map (
-      G_IMG_COLS => G_IMG_COLS,
-      G_IMG_ROWS => G_IMG_ROWS,
-      G_PIX_W    => G_PIX_W,
-      G_WEIGHT_W => G_WEIGHT_W,
-      G_LANES    => G_LANES
+      G_IMG_COLS  => G_IMG_COLS,
+      G_IMG_ROWS  => G_IMG_ROWS,
+      G_PIX_W     => G_PIX_W,
+      G_WEIGHT_W  => G_WEIGHT_W,
+      G_LANES     => G_LANES,
+      G_RECTIFIED => G_RECTIFIED
     )
     port map (
       clk              => clk,
@@ -406,9 +412,10 @@ begin
 
     u_interpolation : entity work.interpolation
       generic map (
-        G_PIX_W    => G_PIX_W,
-        G_WEIGHT_W => G_WEIGHT_W,
-        G_INTERP_F => G_INTERP_F
+        G_PIX_W     => G_PIX_W,
+        G_WEIGHT_W  => G_WEIGHT_W,
+        G_INTERP_F  => G_INTERP_F,
+        G_RECTIFIED => G_RECTIFIED
       )
       port map (
         clk           => clk,

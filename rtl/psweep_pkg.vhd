@@ -38,7 +38,9 @@ package psweep_pkg is
   -- Latencies, first input to first output.
   constant C_ADDRESS_LATENCY       : positive := 9; -- row strobe to position
   constant C_STORAGE_LATENCY       : positive := 4; -- position to 2x2 pixels
-  constant C_INTERPOLATION_LATENCY : positive := 6; -- 2x2 pixels to sample
+
+  -- Pixels to sample. A build for rectified pairs has no interpolation between rows.
+  function interpolation_latency (rectified : integer) return positive;
 
   -- Last sample of a window to its cell; cell to its write into the map.
   function similarity_latency (mncc_w : positive) return positive;
@@ -51,6 +53,10 @@ package psweep_pkg is
 
   -- Sets of `lanes` planes that are swept one after the other. Illegal numbers are for the assertions.
   function plane_sets (planes, lanes : integer) return positive;
+
+  -- Words of a bank of storage. Four banks an image, by the parities of x and y; two, by the parity of x, in a build
+  -- for rectified pairs.
+  function bank_depth (cols, rows, rectified : integer) return integer;
 
   -- true is '1'
   function to_bit (b : boolean) return std_logic;
@@ -93,6 +99,22 @@ package body psweep_pkg is
     end if;
     return (planes + lanes - 1) / lanes;
   end function plane_sets;
+
+  function interpolation_latency (rectified : integer) return positive is
+  begin
+    if rectified = 1 then
+      return 3;
+    end if;
+    return 6;
+  end function interpolation_latency;
+
+  function bank_depth (cols, rows, rectified : integer) return integer is
+  begin
+    if rectified = 1 then
+      return cols / 2 * rows;
+    end if;
+    return cols / 2 * (rows / 2);
+  end function bank_depth;
 
   function to_bit (b : boolean) return std_logic is
   begin

@@ -27,6 +27,7 @@ entity psweep_top is
     G_MNCC_W      : integer := 13;
     G_FRAC_W      : integer := 8;
     G_LANES       : integer := 1;
+    G_RECTIFIED   : integer := 0;
     G_CLK_KHZ     : integer := 166000;
     G_CHUNK_BYTES : integer := 1408; -- 16 .. 1440
     G_ROW_SLOTS   : integer := 0; -- chunks; 0: as many as the largest window needs
@@ -166,6 +167,7 @@ begin
       G_MNCC_W      => G_MNCC_W,
       G_FRAC_W      => G_FRAC_W,
       G_LANES       => G_LANES,
+      G_RECTIFIED   => G_RECTIFIED,
       G_CLK_KHZ     => G_CLK_KHZ,
       G_CHUNK_BYTES => G_CHUNK_BYTES,
       G_ROW_SLOTS   => G_ROW_SLOTS,
@@ -227,7 +229,8 @@ begin
       G_INTERP_F   => G_INTERP_F,
       G_MNCC_W     => G_MNCC_W,
       G_FRAC_W     => G_FRAC_W,
-      G_LANES      => G_LANES
+      G_LANES      => G_LANES,
+      G_RECTIFIED  => G_RECTIFIED
     )
     port map (
       clk           => clk,

@@ -31,6 +31,7 @@ entity responder is
     G_MNCC_W      : integer := 13;
     G_FRAC_W      : integer := 8;
     G_LANES       : integer := 1;
+    G_RECTIFIED   : integer := 0;
     G_CLK_KHZ     : integer := 166000; -- 1000 .. 1000000
     G_CHUNK_BYTES : integer := 1408;   -- 16 .. 1440
     G_ROW_SLOTS   : integer := 70;     -- 2 .. 1024
@@ -208,6 +209,7 @@ architecture rtl of responder is
     v_words(24) := std_logic_vector(to_unsigned(G_SESSION_MS, 32));
     v_words(25) := std_logic_vector(to_unsigned(G_RX_SLOTS, 32));
     v_words(26) := std_logic_vector(to_unsigned(32, 32));
+    v_words(27) := std_logic_vector(to_unsigned(G_RECTIFIED, 32));
     return v_words;
   end function info_words;
   constant C_INFO_WORDS : t_words := info_words;

@@ -8,6 +8,8 @@
 --              and 3 have a second copy. So two lanes need no more RAM than one, and no lane depends on where another
 --              reads
 --   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator
+--   Rectified: G_RECTIFIED = 1: samples lie on rows of pixels; two banks an image, by the parity of x, hold all rows:
+--              y * G_IMG_COLS/2 + x div 2. Same RAM, but half the addresses and a 2:1 choice of pixels. p01, p11 are 0
 --   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W) passed through
 --   Unusable : a sample that is not usable in x and y reads address 0; its pixels mean nothing
 --   Reset    : clears m_valid's way; memories and data have no reset
@@ -19,11 +21,12 @@ library ieee;
 
 entity storage is
   generic (
-    G_IMG_COLS : integer := 340;
-    G_IMG_ROWS : integer := 144;
-    G_PIX_W    : integer := 8;
-    G_WEIGHT_W : integer := 8;
-    G_LANES    : integer := 1
+    G_IMG_COLS  : integer := 340;
+    G_IMG_ROWS  : integer := 144;
+    G_PIX_W     : integer := 8;
+    G_WEIGHT_W  : integer := 8;
+    G_LANES     : integer := 1;
+    G_RECTIFIED : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -53,10 +56,10 @@ entity storage is
     s_yi_right       : in  std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
     s_fx_right       : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
     s_fy_right       : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
-    s_row_even_left  : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    s_row_odd_left   : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    s_row_even_right : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
-    s_row_odd_right  : in  std_logic_vector(G_LANES * clog2(G_IMG_COLS / 2 * (G_IMG_ROWS / 2)) - 1 downto 0);
+    s_row_even_left  : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    s_row_odd_left   : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    s_row_even_right : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    s_row_odd_right  : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
 
     -- p10 is the right neighbour of p00, p01 the one below. m_fy_* hold for a row, like s_fy_*.
     m_valid       : out std_logic_vector(G_LANES - 1 downto 0);
@@ -83,17 +86,20 @@ end entity storage;
 architecture rtl of storage is
 
   constant C_PITCH  : integer := G_IMG_COLS / 2;
-  constant C_DEPTH  : integer := G_IMG_COLS / 2 * (G_IMG_ROWS / 2);
+  constant C_DEPTH  : integer := bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
   constant C_BANK_W : integer := clog2(C_DEPTH);
   constant C_COL_W  : integer := clog2(G_IMG_COLS);
   constant C_COPIES : integer := G_LANES / 2;
 
+  constant C_RECTIFIED : std_logic := to_bit(G_RECTIFIED = 1);
+
   -- Load.
-  signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row pair being loaded
+  signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row (pair) being loaded
   signal write_next : std_logic_vector(C_BANK_W - 1 downto 0);
   signal write_addr : std_logic_vector(C_BANK_W - 1 downto 0);
   signal write_data : std_logic_vector(2 * G_PIX_W - 1 downto 0);
   signal write_bank : std_logic_vector(3 downto 0); -- one-hot: 2 * (y mod 2) + x mod 2
+  signal load_lower : std_logic; -- into banks 2 and 3
 
   -- Both images behind each other, all lanes of the left one in the low half, so that one generate serves both.
   signal s0_xi       : std_logic_vector(2 * G_LANES * C_INT_W - 1 downto 0);
@@ -159,7 +165,11 @@ begin
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
     report "storage: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
     severity failure;
+  assert G_RECTIFIED = 0 or G_RECTIFIED = 1
+    report "storage: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    severity failure;
 
+  load_lower <= load_row_odd and not C_RECTIFIED;
   write_next <= std_logic_vector(write_row + resize(unsigned(load_col(C_COL_W - 1 downto 1)), C_BANK_W));
 
   p_load : process (clk)
@@ -167,13 +177,13 @@ begin
     if rising_edge(clk) then
       write_addr    <= write_next;
       write_data    <= load_data;
-      write_bank(0) <= load_valid and not load_row_odd and not load_col(0);
-      write_bank(1) <= load_valid and not load_row_odd and load_col(0);
-      write_bank(2) <= load_valid and load_row_odd and not load_col(0);
-      write_bank(3) <= load_valid and load_row_odd and load_col(0);
+      write_bank(0) <= load_valid and not load_lower and not load_col(0);
+      write_bank(1) <= load_valid and not load_lower and load_col(0);
+      write_bank(2) <= load_valid and load_lower and not load_col(0);
+      write_bank(3) <= load_valid and load_lower and load_col(0);
       if load_clear = '1' then
         write_row <= (others => '0');
-      elsif load_valid = '1' and load_row_end = '1' and load_row_odd = '1' then
+      elsif load_valid = '1' and load_row_end = '1' and (load_row_odd = '1' or G_RECTIFIED = 1) then
         write_row <= write_row + C_PITCH;
       end if;
       if rst = '1' then
@@ -234,7 +244,7 @@ begin
           addr_3 <= (others => '0');
         end if;
         x_odd <= x_odd(2 downto 1) & xi(0);
-        y_odd <= y_odd(2 downto 1) & s0_yi(n * C_INT_W);
+        y_odd <= y_odd(2 downto 1) & (s0_yi(n * C_INT_W) and not C_RECTIFIED);
         p00   <= pick(word_0, word_1, word_2, word_3, y_odd(3), x_odd(3));
         p10   <= pick(word_0, word_1, word_2, word_3, y_odd(3), not x_odd(3));
         p01   <= pick(word_0, word_1, word_2, word_3, not y_odd(3), x_odd(3));
@@ -287,27 +297,31 @@ begin
           rdata => s3_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
         );
 
-      u_bank_2 : entity work.ram_sdp
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-        port map (
-          clk   => clk,
-          we    => write_bank(2),
-          waddr => write_addr,
-          wdata => write_pixel,
-          raddr => s1_addr_2((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s3_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
-        );
+      g_lower : if G_RECTIFIED = 0 generate
 
-      u_bank_3 : entity work.ram_sdp
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-        port map (
-          clk   => clk,
-          we    => write_bank(3),
-          waddr => write_addr,
-          wdata => write_pixel,
-          raddr => s1_addr_3((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s3_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
-        );
+        u_bank_2 : entity work.ram_sdp
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+          port map (
+            clk   => clk,
+            we    => write_bank(2),
+            waddr => write_addr,
+            wdata => write_pixel,
+            raddr => s1_addr_2((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
+            rdata => s3_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+          );
+
+        u_bank_3 : entity work.ram_sdp
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+          port map (
+            clk   => clk,
+            we    => write_bank(3),
+            waddr => write_addr,
+            wdata => write_pixel,
+            raddr => s1_addr_3((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
+            rdata => s3_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+          );
+
+      end generate g_lower;
 
     end generate g_one;
 
@@ -342,35 +356,44 @@ begin
             b_rdata => s3_word_1((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
           );
 
-        u_bank_2 : entity work.ram_2r
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
-          port map (
-            clk     => clk,
-            a_we    => write_bank(2),
-            a_addr  => s1_addr_2((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-            a_wdata => write_pixel,
-            a_rdata => s3_word_2((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
-            b_addr  => s1_addr_2((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
-            b_rdata => s3_word_2((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
-          );
+        g_lower : if G_RECTIFIED = 0 generate
 
-        u_bank_3 : entity work.ram_2r
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
-          port map (
-            clk     => clk,
-            a_we    => write_bank(3),
-            a_addr  => s1_addr_3((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-            a_wdata => write_pixel,
-            a_rdata => s3_word_3((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
-            b_addr  => s1_addr_3((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
-            b_rdata => s3_word_3((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
-          );
+          u_bank_2 : entity work.ram_2r
+            generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+            port map (
+              clk     => clk,
+              a_we    => write_bank(2),
+              a_addr  => s1_addr_2((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+              a_wdata => write_pixel,
+              a_rdata => s3_word_2((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
+              b_addr  => s1_addr_2((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
+              b_rdata => s3_word_2((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+            );
+
+          u_bank_3 : entity work.ram_2r
+            generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+            port map (
+              clk     => clk,
+              a_we    => write_bank(3),
+              a_addr  => s1_addr_3((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+              a_wdata => write_pixel,
+              a_rdata => s3_word_3((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
+              b_addr  => s1_addr_3((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
+              b_rdata => s3_word_3((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+            );
+
+        end generate g_lower;
 
       end generate g_copy;
 
     end generate g_pair;
 
   end generate g_image;
+
+  g_no_lower : if G_RECTIFIED = 1 generate
+    s3_word_2 <= (others => '0');
+    s3_word_3 <= (others => '0');
+  end generate g_no_lower;
 
   m_p00_left  <= s4_p00(G_LANES * G_PIX_W - 1 downto 0);
   m_p10_left  <= s4_p10(G_LANES * G_PIX_W - 1 downto 0);

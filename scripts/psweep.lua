@@ -144,7 +144,7 @@ local info_words = {
   { "row_slots", "Chunks in the row buffer" }, { "cell_bytes", "Bytes of a cell" },
   { "chunk_cells", "Cells of a chunk" }, { "map_depth", "Cells in the map buffer" },
   { "session_ms", "Silence that ends a session, ms" }, { "rx_slots", "Frames in the receive buffer" },
-  { "counters", "Number of counters" },
+  { "counters", "Number of counters" }, { "rectified", "Built for rectified pairs" },
 }
 for _, word in ipairs(info_words) do
   if word then field("info_" .. word[1], ProtoField.uint32, "info." .. word[1], word[2]) end

@@ -236,6 +236,7 @@ void depth_command(const DepthOptions& o) {
                 {"image_buffer", {run.rtl->generics.img_cols, run.rtl->generics.img_rows}},
                 {"largest_tile", {run.rtl->generics.plane_cols, run.rtl->generics.plane_rows}},
                 {"lanes", run.rtl->generics.lanes},
+                {"rectified", run.rtl->generics.rectified},
                 {"clocks", run.rtl->clocks},
                 {"clocks_by_formula", run.rtl->clocks_expected},
                 {"clocks_in_all", run.rtl->clocks_in_all},

@@ -142,6 +142,7 @@ const rtl::Configuration* choose(SweepSetup& setup, const std::string& tile, con
     trial.format.plane_rows = c.config.plane_rows;
     trial.format.planes = setup.spacing.planes;
     trial.format.lanes = c.config.lanes;
+    trial.format.rectified = c.config.rectified;
     if (!rtl::serves(c.config, trial.format)) {
       why =
           "its window or number formats differ, or it has room for " + std::to_string(c.config.planes) + " planes only";

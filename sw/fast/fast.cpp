@@ -549,8 +549,11 @@ golden::TileResult run_tile_fast(const Config& format, const golden::TileJob& jo
     lines.left_y = line(p.y0_left, job.ty_left, p.dy_left);
     lines.right_x = line(p.x0_right, job.tx_right, p.dx_right);
     lines.right_y = line(p.y0_right, job.ty_right, p.dy_right);
-    if (wraps(lines.left_x, cols) || wraps(lines.left_y, rows) || wraps(lines.right_x, cols) ||
-        wraps(lines.right_y, rows)) {
+    const int64_t fraction = kOne - unit;
+    const bool between_rows =
+        ((lines.left_y.start | lines.left_y.step | lines.right_y.start | lines.right_y.step) & fraction) != 0;
+    if ((format.rectified && between_rows) || wraps(lines.left_x, cols) || wraps(lines.left_y, rows) ||
+        wraps(lines.right_x, cols) || wraps(lines.right_y, rows)) {
       return golden::run_tile(format, job, table, left, right);  // no plan makes such a tile
     }
     auto inside = [&](const Line& l, int lo, int hi, int count) {

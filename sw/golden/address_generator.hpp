@@ -11,7 +11,7 @@ struct Sample {
   int fx = 0, fy = 0;     // fraction truncated to weight_bits: 0 .. 2^weight_bits - 1
   bool inside_x = false;  // x_lo <= x <= x_hi on the truncated position, likewise y
   bool inside_y = false;
-  bool in_window = false;  // all four neighbours (xi,yi) .. (xi+1,yi+1) are loaded
+  bool in_window = false;  // all four neighbours (xi,yi) .. (xi+1,yi+1) are loaded; with `rectified` also fy == 0
 };
 
 inline int32_t wrap_add(int32_t a, uint32_t b) { return static_cast<int32_t>(static_cast<uint32_t>(a) + b); }
@@ -35,6 +35,8 @@ inline Sample make_sample(const Config& c, int32_t x, int32_t y, const Bounds& b
   s.inside_x = within(s.xi, s.fx, b.x_lo, b.x_hi);
   s.inside_y = within(s.yi, s.fy, b.y_lo, b.y_hi);
   s.in_window = s.xi >= 0 && s.xi + 1 < win_cols && s.yi >= 0 && s.yi + 1 < win_rows;
+  // A build for rectified pairs has no weight between rows: such a sample counts as not loaded.
+  if (c.rectified && s.fy != 0) s.in_window = false, s.fy = 0;
   return s;
 }
 

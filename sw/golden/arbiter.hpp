@@ -561,7 +561,7 @@ class Arbiter {
     w[16] = u(config_.clk_khz), w[17] = u(config_.chunk_bytes), w[18] = u(config_.pair_bytes());
     w[19] = u(config_.chunk_pairs()), w[20] = u(config_.slots()), w[21] = u(config_.cell_bytes());
     w[22] = u(config_.chunk_cells()), w[23] = u(depth()), w[24] = u(config_.session_ms);
-    w[25] = u(config_.rx_slots), w[26] = net::kCounterWords;
+    w[25] = u(config_.rx_slots), w[26] = net::kCounterWords, w[27] = u(c.rectified);
     for (const uint32_t v : w) net::append32(out, v);
   }
 

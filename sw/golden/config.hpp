@@ -28,6 +28,7 @@ struct Config {
   int mncc_bits = 13;    // G_MNCC_W     bits of V = ufix(0,mncc_bits), 4 .. 16
   int frac_bits = 8;     // G_FRAC_W     bits of the depth fraction ufix(0,frac_bits), 2 .. 12
   int lanes = 1;         // G_LANES      planes swept at once: 1, 2 or 4
+  int rectified = 0;     // G_RECTIFIED  1: smaller build without interpolation between rows
 
   int sample_bits() const { return pix_bits + interp_frac; }  // interpolated pixel, ufix(pix_bits, interp_frac)
   int norm_bits() const { return mncc_bits + 3; }             // operands of the MNCC divider

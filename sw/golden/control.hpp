@@ -41,8 +41,8 @@ enum ErrorBit : uint8_t {
 // Clocks from the first input to the first output of an entity.
 constexpr int kAddressLatency = 9;
 constexpr int kStorageLatency = 4;
-constexpr int kInterpolationLatency = 6;
 
+inline int interpolation_latency(const Config& c) { return c.rectified ? 3 : 6; }
 inline int similarity_latency(const Config& c) { return 16 + c.mncc_bits; }
 inline int updating_latency(const Config& c) { return 3 + c.lanes + c.frac_bits; }
 // The start command, the last plane noticed in the map, the unload command and the first word out of the map.
@@ -60,7 +60,7 @@ inline uint64_t sweep_clocks(const Config& c, const TileJob& t) {
 }
 inline uint64_t unload_clocks(const TileJob& t) { return static_cast<uint64_t>(t.tile_cols) * t.tile_rows; }
 inline uint64_t fill_clocks(const Config& c) {
-  return static_cast<uint64_t>(kAddressLatency + kStorageLatency + kInterpolationLatency + similarity_latency(c) +
+  return static_cast<uint64_t>(kAddressLatency + kStorageLatency + interpolation_latency(c) + similarity_latency(c) +
                                updating_latency(c) + kControlClocks);
 }
 inline uint64_t engine_clocks(const Config& c, const TileJob& t) {

@@ -32,8 +32,8 @@ inline PlaneTrace sweep_plane(const Config& c, const TileJob& t, const PlaneEntr
       out.left.push_back(sl);
       out.right.push_back(sr);
       out.flags.push_back(flags);
-      out.l.push_back(flags.usable ? interpolate(c, fetch(left, sl), sl.fx, sl.fy) : 0);
-      out.r.push_back(flags.usable ? interpolate(c, fetch(right, sr), sr.fx, sr.fy) : 0);
+      out.l.push_back(flags.usable ? interpolate(c, fetch(c, left, sl), sl.fx, sl.fy) : 0);
+      out.r.push_back(flags.usable ? interpolate(c, fetch(c, right, sr), sr.fx, sr.fy) : 0);
     }
   }
   // Vertical sums of M rows per column, then a horizontal running sum: O(1) a cell, as in the hardware.

@@ -14,13 +14,18 @@ struct Quad {
   int p00 = 0, p10 = 0, p01 = 0, p11 = 0;
 };
 
-inline int bank(int xi, int yi) { return (yi & 1) * 2 + (xi & 1); }
+// With `rectified` two banks by the parity of x, each with all rows.
+inline int bank(const Config& c, int xi, int yi) { return (c.rectified ? 0 : (yi & 1) * 2) + (xi & 1); }
 // Word address inside a bank; the row pitch is half the generic G_IMG_COLS, whatever was loaded.
-inline int bank_address(const Config& c, int xi, int yi) { return (yi >> 1) * (c.img_cols / 2) + (xi >> 1); }
+inline int bank_address(const Config& c, int xi, int yi) {
+  return (c.rectified ? yi : yi >> 1) * (c.img_cols / 2) + (xi >> 1);
+}
 
 // Requires s.in_window; the value for other samples is not defined by the contract (the interpolation replaces it by
 // 0).
-inline Quad fetch(const Pixels& window, const Sample& s) {
+// With `rectified` the lower neighbours are 0: nobody reads them.
+inline Quad fetch(const Config& c, const Pixels& window, const Sample& s) {
+  if (c.rectified) return {window.at(s.xi, s.yi), window.at(s.xi + 1, s.yi), 0, 0};
   return {window.at(s.xi, s.yi), window.at(s.xi + 1, s.yi), window.at(s.xi, s.yi + 1), window.at(s.xi + 1, s.yi + 1)};
 }
 

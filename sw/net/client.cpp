@@ -58,6 +58,7 @@ std::optional<Capabilities> parse_info(const std::vector<uint32_t>& w) {
   e.mncc_bits = take(10, 4, 16);
   e.frac_bits = take(11, 2, 12);
   e.lanes = take(12, 1, 64);
+  e.rectified = take(27, 0, 1);
   c.mac = uint64_t{w[14] & 0xffff} << 32 | w[15];
   c.config.clk_khz = take(16, 1, 10000000);
   c.config.chunk_bytes = take(17, 16, 1440);
@@ -78,9 +79,9 @@ std::optional<Capabilities> parse_info(const std::vector<uint32_t>& w) {
 bool same_capabilities(const ArbiterConfig& a, const ArbiterConfig& b) {
   auto key = [](const ArbiterConfig& c) {
     const golden::Config& e = c.engine;
-    return std::vector<int>{e.img_cols,  e.img_rows, e.plane_cols,  e.plane_rows,  e.planes,
-                            e.window,    e.pix_bits, e.weight_bits, e.interp_frac, e.mncc_bits,
-                            e.frac_bits, e.lanes,    c.chunk_bytes, c.row_slots,   c.map_depth};
+    return std::vector<int>{e.img_cols,  e.img_rows,    e.plane_cols,  e.plane_rows, e.planes,    e.window,
+                            e.pix_bits,  e.weight_bits, e.interp_frac, e.mncc_bits,  e.frac_bits, e.lanes,
+                            e.rectified, c.chunk_bytes, c.row_slots,   c.map_depth};
   };
   return key(a) == key(b);
 }

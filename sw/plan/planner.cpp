@@ -296,6 +296,7 @@ void check_setup(const SweepSetup& setup) {
   require_range(f.interp_frac, 0, 8, "interp_frac");
   require_range(f.mncc_bits, 4, 16, "mncc_bits");
   require_range(f.frac_bits, 2, 12, "frac_bits");
+  require_range(f.rectified, 0, 1, "rectified");
   require_range(f.planes, 1, 1024, "format.planes");
   require_range(setup.threshold, 0, (1 << f.mncc_bits) - 1, "threshold");
   require_range(setup.spacing.planes, 1, f.planes, "planes");
@@ -329,6 +330,18 @@ std::vector<golden::PlaneEntry> plane_table(const SweepSetup& setup) {
     p.dx_right = step_word(rig.right.fx / eye.fx, "dx_right");
     p.dy_right = step_word(rig.right.fy / eye.fy, "dy_right");
     table.push_back(p);
+  }
+  if (setup.format.rectified) {
+    const int64_t unit = int64_t{1} << (golden::kPosFrac - setup.format.weight_bits),
+                  half = rounding_half(setup.format);
+    for (const auto& p : table) {
+      auto on_rows = [&](int32_t start, uint32_t step) {
+        return step == kOne && ((start + half) & (kOne - unit)) == 0;
+      };
+      require(on_rows(p.y0_left, p.dy_left) && on_rows(p.y0_right, p.dy_right),
+              "rig: the rows of both images do not correspond (fy, cy of left and right), but the engine is built for "
+              "rectified pairs");
+    }
   }
   // Samples of the cells that can be valid, skirt included.
   const Axis x = make_axis(setup, table, true), y = make_axis(setup, table, false);

@@ -357,6 +357,7 @@ inline Message info_reply(const net::Header& h, const net::ArbiterConfig& a, con
   word("session_ms", a.session_ms);
   word("rx_slots", a.rx_slots);
   m.u32("info.counters", counters);
+  word("rectified", c.rectified);
   for (const uint32_t w : reserved) m.u32("info.reserved", w);
   return m;
 }

@@ -162,6 +162,7 @@ net::ArbiterConfig random_config(Random& random) {
   c.mncc_bits = random.between(4, 16);
   c.frac_bits = random.between(2, 12);
   c.lanes = random.between(1, 64);
+  c.rectified = random.between(0, 1);
   a.clk_khz = random.between(30000, 400000);
   a.chunk_bytes = random.between(16, 1440);
   a.row_slots = random.between(2, 1024);
@@ -302,7 +303,7 @@ std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout,
     net::Mac mac;
     for (uint8_t& b : mac) b = static_cast<uint8_t>(random.bits(8));
     all.push_back(info_reply(reply(net::kInfo, net::kOk), layout ? *layout : random_config(random), mac,
-                             random.bits(32), random.words(5)));
+                             random.bits(32), random.words(4)));
   }
   all.push_back(counters_reply(reply(net::kCounters, net::kOk), random.words(net::kCounterWords)));
   {

@@ -7,6 +7,8 @@
 #include "Vpsweep_odd.h"
 #include "Vpsweep_odd_2.h"
 #include "Vpsweep_odd_4.h"
+#include "Vpsweep_rectified.h"
+#include "Vpsweep_rectified_2.h"
 #include "Vpsweep_tiny.h"
 #include "rtl/rtl_engine.hpp"
 
@@ -34,6 +36,14 @@ struct Odd2 {
 struct Odd4 {
   using Dut = Vpsweep_odd_4;
   static golden::Config config() { return configuration("odd_4").config; }
+};
+struct Rectified {
+  using Dut = Vpsweep_rectified;
+  static golden::Config config() { return configuration("rectified").config; }
+};
+struct Rectified2 {
+  using Dut = Vpsweep_rectified_2;
+  static golden::Config config() { return configuration("rectified_2").config; }
 };
 
 }  // namespace psweep::tb

@@ -266,7 +266,7 @@ class EngineBench : public Agent {
       expected_lost_ += f.window_error;
       auto quad = [&](const golden::Pixels& image, const golden::Sample& s) {
         if (!f.usable) return uint64_t{0};
-        const golden::Quad q = golden::fetch(image, s);
+        const golden::Quad q = golden::fetch(config_, image, s);
         return pack({{u(q.p00), p}, {u(q.p10), p}, {u(q.p01), p}, {u(q.p11), p}});
       };
       const uint64_t mask = f.usable ? ~uint64_t{0} : 0;  // pixels of other samples mean nothing

@@ -7,7 +7,8 @@
 using namespace psweep;
 using namespace psweep::tb;
 
-TEMPLATE_TEST_CASE("engine: every texture in every geometry, back to back", "", Tiny, Odd, Odd2, Odd4) {
+TEMPLATE_TEST_CASE("engine: every texture in every geometry, back to back", "", Tiny, Odd, Odd2, Odd4, Rectified,
+                   Rectified2) {
   const uint32_t seed = test_seed();
   INFO("seed " << seed);
   const golden::Config config = TestType::config();
@@ -27,7 +28,8 @@ TEMPLATE_TEST_CASE("engine: every texture in every geometry, back to back", "", 
   CHECK(found > 100);  // the stimuli lead to depths, not to nothing but rejected cells
 }
 
-TEMPLATE_TEST_CASE("engine: stalls on every stream change nothing but the clocks", "", Tiny, Odd, Odd2, Odd4) {
+TEMPLATE_TEST_CASE("engine: stalls on every stream change nothing but the clocks", "", Tiny, Odd, Odd2, Odd4, Rectified,
+                   Rectified2) {
   const uint32_t seed = test_seed() + 1;
   const double amount = GENERATE(0.3, 0.8);
   const int which = GENERATE(1, 2, 4, 7);
@@ -39,7 +41,7 @@ TEMPLATE_TEST_CASE("engine: stalls on every stream change nothing but the clocks
   for (int i = 0; i < 3; ++i) bench.run(maker.any());
 }
 
-TEMPLATE_TEST_CASE("engine: smallest tiles", "", Tiny, Odd, Odd2, Odd4) {
+TEMPLATE_TEST_CASE("engine: smallest tiles", "", Tiny, Odd, Odd2, Odd4, Rectified, Rectified2) {
   const golden::Config config = TestType::config();
   EngineBench<typename TestType::Dut> bench(config, test_seed());
   StimulusMaker maker(config, test_seed());
@@ -51,7 +53,7 @@ TEMPLATE_TEST_CASE("engine: smallest tiles", "", Tiny, Odd, Odd2, Odd4) {
     bench.run(maker.make(Texture::kStereo, Geometry::kInside, cols, 2, 3));
 }
 
-TEMPLATE_TEST_CASE("engine: random tiles with random stalls", "", Tiny, Odd, Odd2, Odd4) {
+TEMPLATE_TEST_CASE("engine: random tiles with random stalls", "", Tiny, Odd, Odd2, Odd4, Rectified, Rectified2) {
   const uint32_t seed = test_seed() + 2;
   INFO("seed " << seed);
   const golden::Config config = TestType::config();

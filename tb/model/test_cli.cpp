@@ -376,7 +376,8 @@ TEST_CASE("command line: --engine rtl writes the bytes of --engine fixed", "[cli
   // Window and formats of the configuration, its own tiles and smaller ones, with clean-up and without. The number of
   // planes is odd, so that the middle one is the wall.
   for (const char* options : {"--config tiny --planes 11", "--config tiny --planes 7 --tile 9x5 --cleanup",
-                              "--config odd --planes 19 --threads 1", "--config odd --planes 19 --threads 3"}) {
+                              "--config odd --planes 19 --threads 1", "--config odd --planes 19 --threads 3",
+                              "--config rectified --planes 19", "--config rectified_2 --planes 19"}) {
     const std::string base = "depth left.png right.png --calib calib.yaml " + std::string(options);
     const Outcome fixed = psweep_run(dir, base + " --engine fixed -o fixed");
     const Outcome rtl = psweep_run(dir, base + " --engine rtl -o rtl");

@@ -116,10 +116,24 @@ TEST_CASE("every 2x2 neighbourhood lies in four banks, every pixel in its own wo
   std::set<std::pair<int, int>> words;
   for (int y = 0; y < c.img_rows; ++y) {
     for (int x = 0; x < c.img_cols; ++x) {
-      CHECK(words.insert({bank(x, y), bank_address(c, x, y)}).second);
+      CHECK(words.insert({bank(c, x, y), bank_address(c, x, y)}).second);
       CHECK(bank_address(c, x, y) < c.img_cols / 2 * c.img_rows / 2);
-      const std::set<int> banks{bank(x, y), bank(x + 1, y), bank(x, y + 1), bank(x + 1, y + 1)};
+      const std::set<int> banks{bank(c, x, y), bank(c, x + 1, y), bank(c, x, y + 1), bank(c, x + 1, y + 1)};
       CHECK(banks.size() == 4);
+    }
+  }
+}
+
+TEST_CASE("for rectified pairs: a row's 1x2 neighbourhoods lie in two banks, every pixel in its own word") {
+  Config c;
+  c.img_cols = 12, c.img_rows = 8, c.rectified = 1;
+  std::set<std::pair<int, int>> words;
+  for (int y = 0; y < c.img_rows; ++y) {
+    for (int x = 0; x < c.img_cols; ++x) {
+      CHECK(words.insert({bank(c, x, y), bank_address(c, x, y)}).second);
+      CHECK(bank_address(c, x, y) < c.img_cols / 2 * c.img_rows);
+      CHECK(bank(c, x, y) != bank(c, x + 1, y));
+      CHECK(bank(c, x, y) < 2);
     }
   }
 }

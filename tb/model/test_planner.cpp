@@ -272,6 +272,10 @@ TEST_CASE("wrong setups name their field") {
   CHECK(mentions(error_after([](SweepSetup& s) { s.spacing.zmax = 0.5; }), {"zmax"}));
   CHECK(mentions(error_after([](SweepSetup& s) { s.threshold = 1 << 13; }), {"threshold"}));
   CHECK(mentions(error_after([](SweepSetup& s) { s.format.window = 4; }), {"window"}));
+  CHECK(mentions(error_after([](SweepSetup& s) { s.format.rectified = 2; }), {"rectified"}));
+  CHECK(error_after([](SweepSetup& s) { s.format.rectified = 1; }) == "no error");
+  CHECK(mentions(error_after([](SweepSetup& s) { s.format.rectified = 1, s.rig.left.cy += 0.25; }), {"rows", "cy"}));
+  CHECK(mentions(error_after([](SweepSetup& s) { s.format.rectified = 1, s.rig.right.fy *= 1.01; }), {"rows", "fy"}));
   CHECK(mentions(error_after([](SweepSetup& s) { s.format.interp_frac = 9; }), {"interp_frac"}));
   // A metre of baseline seen from a centimetre: the shift leaves sfix(13,19).
   CHECK(mentions(error_after([](SweepSetup& s) { s.spacing.zmin = 0.0005; }), {"plane 0", "x0_left"}));

@@ -29,6 +29,7 @@ entity psweep_replay is
     G_MNCC_W      : integer;
     G_FRAC_W      : integer;
     G_LANES       : integer;
+    G_RECTIFIED   : integer;
     G_CLK_KHZ     : integer;
     G_CHUNK_BYTES : integer;
     G_ROW_SLOTS   : integer;
@@ -87,6 +88,7 @@ begin
       G_MNCC_W      => G_MNCC_W,
       G_FRAC_W      => G_FRAC_W,
       G_LANES       => G_LANES,
+      G_RECTIFIED   => G_RECTIFIED,
       G_CLK_KHZ     => G_CLK_KHZ,
       G_CHUNK_BYTES => G_CHUNK_BYTES,
       G_ROW_SLOTS   => G_ROW_SLOTS,

@@ -7,6 +7,7 @@
 
 #include "Vaddress_generator_mid.h"
 #include "Vaddress_generator_min.h"
+#include "Vaddress_generator_rectified.h"
 #include "golden/address_generator.hpp"
 #include "golden/control.hpp"
 #include "golden/storage.hpp"
@@ -38,7 +39,7 @@ struct Bench : Agent {
     Place place;
   };
   std::deque<Expected> expected;
-  uint64_t surplus = 0;
+  uint64_t surplus = 0, on_row = 0, between_rows = 0;
 
   explicit Bench(const golden::Config& c) : config(c) {
     dut.table_we = 0;
@@ -84,7 +85,8 @@ struct Bench : Agent {
     if (e.usable_y) {
       // Address of column 0 of whichever of the rows yi, yi+1 is even / odd.
       auto row = [&](int yi, int parity) {
-        return static_cast<uint64_t>(golden::bank_address(config, 0, (yi & 1) == parity ? yi : yi + 1));
+        return static_cast<uint64_t>(
+            golden::bank_address(config, 0, config.rectified || (yi & 1) == parity ? yi : yi + 1));
       };
       rows.compare(dut.m_row_even_left, row(e.left.yi, 0), e.place, now);
       rows.compare(dut.m_row_odd_left, row(e.left.yi, 1), e.place, now);
@@ -150,6 +152,14 @@ struct Bench : Agent {
             auto y_loaded = [&](const golden::Sample& s) { return s.yi >= 0 && s.yi + 1 < t.win_rows; };
             e.usable_x = e.left.inside_x && e.right.inside_x && x_loaded(e.left) && x_loaded(e.right);
             e.usable_y = e.left.inside_y && e.right.inside_y && y_loaded(e.left) && y_loaded(e.right);
+            if (config.rectified && e.usable_y) {
+              golden::Config full = config;
+              full.rectified = 0;
+              const bool on_rows = golden::left_sample(full, t, table[k], i, j).fy == 0 &&
+                                   golden::right_sample(full, t, table[k], i, j).fy == 0;
+              e.usable_y = on_rows;
+              (on_rows ? on_row : between_rows) += 1;
+            }
             const golden::SampleFlags want = golden::sample_flags(e.left, e.right);
             REQUIRE(want.usable == (e.usable_x && e.usable_y));
             e.window_error = want.window_error;
@@ -190,8 +200,8 @@ int32_t fixed(double pixels) { return static_cast<int32_t>(std::lround(pixels * 
 
 }  // namespace
 
-TEST_CASE("address_generator: samples around the window, rows of every length") {
-  Bench<Vaddress_generator_mid> bench(mid_config());
+template <class Dut>
+void around_the_window(Bench<Dut>& bench) {
   const uint32_t seed = test_seed();
   INFO("seed " << seed);
   std::mt19937 random(seed);
@@ -221,6 +231,20 @@ TEST_CASE("address_generator: samples around the window, rows of every length") 
     bench.sweep(t, table, cols, 40, 0);
   }
   bench.check();
+}
+
+TEST_CASE("address_generator: samples around the window, rows of every length") {
+  Bench<Vaddress_generator_mid> bench(mid_config());
+  around_the_window(bench);
+}
+
+TEST_CASE("address_generator: built for rectified pairs, samples between rows are refused") {
+  golden::Config c = mid_config();
+  c.rectified = 1;
+  Bench<Vaddress_generator_rectified> bench(c);
+  around_the_window(bench);
+  CHECK(bench.on_row > 100);
+  CHECK(bench.between_rows > 100);
 }
 
 TEST_CASE("address_generator: positions anywhere, wrapping modulo 2^32") {

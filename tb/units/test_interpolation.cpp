@@ -9,6 +9,9 @@
 #include "Vinterpolation_3_1_8.h"
 #include "Vinterpolation_8_4_6.h"
 #include "Vinterpolation_8_8_2.h"
+#include "Vinterpolation_rectified_12_12_0.h"
+#include "Vinterpolation_rectified_8_4_6.h"
+#include "Vinterpolation_rectified_8_8_2.h"
 #include "golden/control.hpp"
 #include "golden/interpolation.hpp"
 #include "support/catch.hpp"
@@ -19,8 +22,6 @@ using namespace psweep;
 using namespace psweep::tb;
 
 namespace {
-
-constexpr uint64_t kLatency = golden::kInterpolationLatency;
 
 template <class Dut>
 struct Bench : Agent {
@@ -38,8 +39,9 @@ struct Bench : Agent {
   std::deque<Expected> expected;
   uint64_t surplus = 0;
 
-  Bench(int pix_bits, int weight_bits, int interp_frac) {
+  Bench(int pix_bits, int weight_bits, int interp_frac, int rectified) {
     config.pix_bits = pix_bits, config.weight_bits = weight_bits, config.interp_frac = interp_frac;
+    config.rectified = rectified;
     dut.s_valid = 0;
     dut.s_row_first = 0;
     sim.add(*this);
@@ -59,7 +61,7 @@ struct Bench : Agent {
     sideband.compare(static_cast<uint64_t>(dut.m_row_first << 4 | dut.m_plane_first << 3 | dut.m_plane_last << 2 |
                                            dut.m_usable_x << 1 | dut.m_usable_y),
                      e.sideband, e.place, now);
-    latency.compare(now, e.clock + kLatency, e.place, now);
+    latency.compare(now, e.clock + static_cast<uint64_t>(golden::interpolation_latency(config)), e.place, now);
   }
   int below(int n) { return static_cast<int>(static_cast<uint32_t>(random()) % static_cast<uint32_t>(n)); }
 
@@ -106,8 +108,11 @@ struct Bench : Agent {
         put(dut.s_p01_right, r.p01), put(dut.s_p11_right, r.p11);
         Expected e;
         const bool usable = usable_x && usable_y;
-        e.l = usable ? golden::interpolate(config, l, fxl, fyl) : 0;
-        e.r = usable ? golden::interpolate(config, r, fxr, fyr) : 0;
+        // Without interpolation between rows the inputs fy and p01, p11 mean nothing, whatever they show.
+        auto model = [&](const golden::Quad& q, int fx, int fy) {
+          return usable ? golden::interpolate(config, q, fx, config.rectified ? 0 : fy) : 0;
+        };
+        e.l = model(l, fxl, fyl), e.r = model(r, fxr, fyr);
         e.sideband = static_cast<uint64_t>(dut.s_row_first << 4 | dut.s_plane_first << 3 | dut.s_plane_last << 2 |
                                            usable_x << 1 | usable_y);
         e.clock = sim.cycle();
@@ -131,9 +136,9 @@ struct Bench : Agent {
 };
 
 template <class Dut>
-void run_format(int pix_bits, int weight_bits, int interp_frac) {
+void run_format(int pix_bits, int weight_bits, int interp_frac, int rectified = 0) {
   INFO("seed " << test_seed() << " format " << pix_bits << ' ' << weight_bits << ' ' << interp_frac);
-  Bench<Dut> bench(pix_bits, weight_bits, interp_frac);
+  Bench<Dut> bench(pix_bits, weight_bits, interp_frac, rectified);
   bench.run(40, 8);
   bench.run(40, 200);
   bench.check();
@@ -145,3 +150,8 @@ TEST_CASE("interpolation: 8-bit pixels, 8-bit weights, 2 fraction bits") { run_f
 TEST_CASE("interpolation: widest pixels and weights, integer result") { run_format<Vinterpolation_12_12_0>(12, 12, 0); }
 TEST_CASE("interpolation: more fraction bits than weight bits") { run_format<Vinterpolation_8_4_6>(8, 4, 6); }
 TEST_CASE("interpolation: exact results padded with zeros") { run_format<Vinterpolation_3_1_8>(3, 1, 8); }
+TEST_CASE("interpolation: along the row only, for rectified pairs") {
+  run_format<Vinterpolation_rectified_8_8_2>(8, 8, 2, 1);
+  run_format<Vinterpolation_rectified_12_12_0>(12, 12, 0, 1);
+  run_format<Vinterpolation_rectified_8_4_6>(8, 4, 6, 1);
+}

@@ -9,6 +9,8 @@
 #include "Vstorage_mid.h"
 #include "Vstorage_mid_2.h"
 #include "Vstorage_mid_4.h"
+#include "Vstorage_rectified.h"
+#include "Vstorage_rectified_4.h"
 #include "golden/control.hpp"
 #include "golden/storage.hpp"
 #include "support/catch.hpp"
@@ -45,8 +47,8 @@ struct Bench : Agent {
   std::array<std::deque<Expected>, 4> expected;  // by lane
   uint64_t surplus = 0;
 
-  explicit Bench(int lanes) {
-    config.lanes = lanes;
+  Bench(int lanes, int rectified) {
+    config.lanes = lanes, config.rectified = rectified;
     dut.load_valid = 0;
     dut.load_clear = 0;
     dut.s_valid = 0;
@@ -132,9 +134,10 @@ struct Bench : Agent {
   // everything. Lanes beyond the first `active` rest.
   void read(const golden::Pixels& left, const golden::Pixels& right, int rows, int cols, int active) {
     auto row_address = [&](int yi, int parity) {
-      return static_cast<uint64_t>(golden::bank_address(config, 0, (yi & 1) == parity ? yi : yi + 1));
+      return static_cast<uint64_t>(
+          golden::bank_address(config, 0, config.rectified || (yi & 1) == parity ? yi : yi + 1));
     };
-    const int w = config.weight_bits, bank = 7;
+    const int w = config.weight_bits, bank = config.rectified ? 8 : 7;
     struct Row {
       bool usable;
       int yl, yr, fyl, fyr;
@@ -167,7 +170,7 @@ struct Bench : Agent {
             put(dut.s_fy_left, n, w, static_cast<uint64_t>(at_row.fyl));
             put(dut.s_fy_right, n, w, static_cast<uint64_t>(at_row.fyr));
             auto address = [&](int yi, int parity) {
-              return usable_y ? row_address(yi, parity) : static_cast<uint64_t>(below(128));
+              return usable_y ? row_address(yi, parity) : static_cast<uint64_t>(below(1 << bank));
             };
             put(dut.s_row_even_left, n, bank, address(at_row.yl, 0));
             put(dut.s_row_odd_left, n, bank, address(at_row.yl, 1));
@@ -177,7 +180,7 @@ struct Bench : Agent {
           if (!on) continue;
           Expected e;
           e.usable = usable_x && usable_y;
-          if (e.usable) e.left = golden::fetch(left, l), e.right = golden::fetch(right, r);
+          if (e.usable) e.left = golden::fetch(config, left, l), e.right = golden::fetch(config, right, r);
           e.sideband = pack(
               static_cast<uint64_t>(strobes[0] << 4 | strobes[1] << 3 | strobes[2] << 2 | usable_x << 1 | usable_y),
               fxl, at_row.fyl, fxr, at_row.fyr);
@@ -195,9 +198,9 @@ struct Bench : Agent {
 };
 
 template <class Dut>
-void run_lanes(int lanes) {
-  Bench<Dut> bench(lanes);
-  INFO("seed " << test_seed() << " lanes " << lanes);
+void run_lanes(int lanes, int rectified) {
+  Bench<Dut> bench(lanes, rectified);
+  INFO("seed " << test_seed() << " lanes " << lanes << " rectified " << rectified);
   for (int round = 0; round < 25; ++round) {
     // The first rounds are the full buffer and the smallest window, then any.
     const int cols = round == 0 ? 26 : round == 1 ? 2 : 2 + bench.below(25);
@@ -218,6 +221,8 @@ void run_lanes(int lanes) {
 
 }  // namespace
 
-TEST_CASE("storage: every neighbourhood of windows of many sizes") { run_lanes<Vstorage_mid>(1); }
-TEST_CASE("storage: two lanes, each at its own place") { run_lanes<Vstorage_mid_2>(2); }
-TEST_CASE("storage: four lanes, each at its own place") { run_lanes<Vstorage_mid_4>(4); }
+TEST_CASE("storage: every neighbourhood of windows of many sizes") { run_lanes<Vstorage_mid>(1, 0); }
+TEST_CASE("storage: two lanes, each at its own place") { run_lanes<Vstorage_mid_2>(2, 0); }
+TEST_CASE("storage: four lanes, each at its own place") { run_lanes<Vstorage_mid_4>(4, 0); }
+TEST_CASE("storage: two banks an image for rectified pairs") { run_lanes<Vstorage_rectified>(1, 1); }
+TEST_CASE("storage: two banks an image, four lanes") { run_lanes<Vstorage_rectified_4>(4, 1); }
