@@ -6,7 +6,7 @@ SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 
 BUILD := build
-export JOBS VERBOSE T SEED SETUP
+export JOBS VERBOSE T SEED SETUP STAGE CFG PLANE CELL
 
 # Everything that `make config` passes on to scripts/make_config.cmake.
 CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
@@ -60,6 +60,11 @@ config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=
 bench: setup ## Speed of the float reference, the bit-true model and the simulated RTL on this machine
 	@scripts/build.sh psweep psweep_bench
 	@scripts/bench.sh
+
+.PHONY: waves
+waves: setup ## Waves of one cell, and its values at every stage   STAGE=similarity CFG=tiny PLANE=6 CELL=8,6
+	@scripts/build.sh psweep-waves
+	@scripts/waves.sh
 
 .PHONY: formal
 formal: ## Prove properties of the clock crossings and other small circuits, and find the faults put into them
