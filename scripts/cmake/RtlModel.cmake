@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # VHDL entity + generics -> Verilated C++ library.
 #
-#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST])
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES])
 #     Static library <name> with header V<name>.h (class V<name>) for entity rtl/<entity>.vhd. TRACE: the model can
 #     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
+#     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).
 #   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
 #     ctest case: elaboration with these generics has to fail, and the message has to match.
 #
@@ -21,9 +22,20 @@ execute_process(
   OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 
 set(PSWEEP_VHDL_STANDARD --std=93c)
+# For builds with a purpose of their own (scripts/mutants.sh, scripts/coverage.sh).
+set(PSWEEP_VERILATOR_EXTRA "" CACHE STRING "Further options of Verilator")
+set(PSWEEP_FAST_OPTION -O3 CACHE STRING "Optimisation of models that are built for long runs")
 set(PSWEEP_RTL_MODEL_DIR ${CMAKE_CURRENT_LIST_DIR})
 # -Wall and every warning is an error, but for the waivers of ghdl_netlist.vlt.
-set(PSWEEP_VERILATOR_FLAGS -Wall -O3 --x-initial unique --x-assign unique)
+set(PSWEEP_VERILATOR_FLAGS -Wall -O3 --x-initial unique --x-assign unique ${PSWEEP_VERILATOR_EXTRA})
+
+include(CheckCXXCompilerFlag)
+check_cxx_compiler_flag("--param=max-rtl-if-conversion-unpredictable-cost=200" PSWEEP_HAVE_IF_CONVERSION)
+set(PSWEEP_NO_BRANCHES)
+if(PSWEEP_HAVE_IF_CONVERSION)
+  set(PSWEEP_NO_BRANCHES --param=max-rtl-if-conversion-unpredictable-cost=200
+                         --param=max-rtl-if-conversion-predictable-cost=200)
+endif()
 
 # Newer versions print a page of statistics for every model.
 execute_process(COMMAND ${PSWEEP_VERILATOR} --version OUTPUT_VARIABLE PSWEEP_VERILATOR_VERSION)
@@ -70,11 +82,19 @@ function(psweep_rtl_sources entity out)
 endfunction()
 
 function(rtl_model name)
-  cmake_parse_arguments(A "TRACE;FAST" "TOP" "GENERICS" ${ARGN})
+  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES" "TOP" "GENERICS" ${ARGN})
   psweep_rtl_sources(${A_TOP} sources)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
   set(obj ${dir}/obj)
   list(TRANSFORM A_GENERICS PREPEND -g)
+  set(flags ${PSWEEP_VERILATOR_FLAGS})
+  set(fast_options -O1)
+  if(A_FAST)
+    # Unknown values are constants instead of random numbers that have to be carried along, and what depends on data
+    # (the digits of the dividers) is chosen without branches, which no processor can predict.
+    list(APPEND flags --x-assign fast)
+    set(fast_options ${PSWEEP_FAST_OPTION} ${PSWEEP_NO_BRANCHES})
+  endif()
   set(trace_flag)
   if(A_TRACE AND ZLIB_FOUND)
     set(trace_flag --trace-fst)
@@ -86,7 +106,8 @@ function(rtl_model name)
     OUTPUT ${dir}/${A_TOP}.v
     COMMAND
       ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
-      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -P ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
+      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES} -P
+      ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     COMMENT "GHDL ${name}"
     VERBATIM)
@@ -97,7 +118,7 @@ function(rtl_model name)
   add_custom_command(
     OUTPUT ${header} ${fast} ${slow}
     COMMAND ${CMAKE_COMMAND} -E rm -rf ${obj}
-    COMMAND ${PSWEEP_VERILATOR} --cc ${PSWEEP_VERILATOR_FLAGS} ${trace_flag} --prefix V${name} --Mdir ${obj}
+    COMMAND ${PSWEEP_VERILATOR} --cc ${flags} ${trace_flag} --prefix V${name} --Mdir ${obj}
             --top-module ${A_TOP} ${waivers} ${dir}/${A_TOP}.v
     COMMAND ${CMAKE_COMMAND} -D OBJ=${obj} -D FAST=${fast} -D SLOW=${slow}
             -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
@@ -107,7 +128,7 @@ function(rtl_model name)
 
   add_library(${name} STATIC ${fast} ${slow} ${header})
   # Constructors and reset code run once: compiling them without optimisation halves the build.
-  set_source_files_properties(${fast} PROPERTIES COMPILE_OPTIONS "$<IF:$<BOOL:${A_FAST}>,-O3,-O1>")
+  set_source_files_properties(${fast} PROPERTIES COMPILE_OPTIONS "${fast_options}")
   set_source_files_properties(${slow} PROPERTIES COMPILE_OPTIONS "-O0")
   target_compile_options(${name} PRIVATE -w)  # generated code
   target_include_directories(${name} SYSTEM PUBLIC ${obj})

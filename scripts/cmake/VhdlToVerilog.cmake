@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> -P VhdlToVerilog.cmake
+# cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> [-D BOTH_EDGES=ON]
+#       -P VhdlToVerilog.cmake
 # Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
 # Shows GHDL's messages if it fails or warns; its notes ("found RAM ..") are left out, as is the warning that attributes
 # for the FPGA tools do not reach the Verilog.
@@ -24,4 +25,13 @@ function(run_ghdl)
 endfunction()
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${SOURCES})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
+if(BOTH_EDGES)
+  # Registers take their values at both edges of the only clock.
+  file(READ ${DIR}/raw.v text)
+  string(REPLACE "@(posedge clk)" "@(posedge clk or negedge clk)" text "${text}")
+  if(NOT text MATCHES "negedge clk")
+    message(FATAL_ERROR "${TOP}: no register of clk found")
+  endif()
+  file(WRITE ${DIR}/raw.v "${text}")
+endif()
 file(COPY_FILE ${DIR}/raw.v ${DIR}/${TOP}.v ONLY_IF_DIFFERENT)
