@@ -350,12 +350,12 @@ void write_save_file(const Capture& c, const Layout& layout, const std::string& 
   out << "[*] psweep-waves: " << c.engine->name << ", " << layout.stage << ", plane " << c.cell.plane << ", cell "
       << c.cell.column << ',' << c.cell.row << '\n';
   out << "[dumpfile] \"" << (slash == std::string::npos ? c.fst : c.fst.substr(slash + 1)) << "\"\n";
-  // About 900 pixels are left for the waves; GTKWave's zoom is the negative binary logarithm of ps per pixel.
+  // About 1200 pixels are left for the waves; GTKWave's zoom is the negative binary logarithm of the time in 200.
   const uint64_t around = whole ? 4 : 3;
-  const double per_pixel = static_cast<double>((to - from + 1 + 2 * around) * kPicosecondsPerClock) / 900;
+  const double per_pixel = static_cast<double>((to - from + 1 + 2 * around) * kPicosecondsPerClock) / 1200;
   out << "[timestart] " << sub(from, around) * kPicosecondsPerClock << '\n';
-  out << "[size] 1280 960\n[pos] -1 -1\n";
-  out << '*' << -std::log2(per_pixel) << ' ' << to * kPicosecondsPerClock;
+  out << "[size] 1600 1000\n[pos] -1 -1\n";
+  out << '*' << -std::log2(200 * per_pixel) << ' ' << to * kPicosecondsPerClock;
   for (int marker = 0; marker < 26; ++marker)
     out << ' '
         << (marker < kPlaces ? std::to_string(c.here[static_cast<size_t>(marker)] * kPicosecondsPerClock) : "-1");
@@ -386,10 +386,10 @@ void write_save_file(const Capture& c, const Layout& layout, const std::string& 
       if (first && group.timed) {
         const std::string sideband = cell + group.module + '.' + group.name + '.';
         if (group.name == "s" || group.name == "m" || group.name == "sweep") {
-          show(sideband + "plane", "dec", 0, kOrange, "");
-          show(sideband + "row", "sdec", 0, kOrange, "");
+          show(sideband + "plane", "dec", 0, kOrange, "plane");
+          show(sideband + "row", "sdec", 0, kOrange, "row");
         }
-        show(sideband + "column", "sdec", 0, kOrange, "");
+        show(sideband + "column", "sdec", 0, kOrange, "column");
         if (group.name == "s" && base_of(group.module) < kSimilarityOut)
           show(sideband + "window", "bin", 0, kOrange, "");
       }
