@@ -146,14 +146,13 @@ void write_trimmed(const FstReader& from, const std::string& root, uint64_t firs
                               (range.empty() ? name : name + ' ' + range).c_str(), alias);
   };
 
-  std::map<uint32_t, uint32_t> copied;  // handle there, handle here
+  std::vector<uint32_t> copied;  // handle there, handle here, 0: not copied
   const size_t skip = root.find_last_of('.') == std::string::npos ? 0 : root.find_last_of('.') + 1;
   for (const Signal& s : from.signals()) {
     if (s.path.compare(0, root.size() + 1, root + '.') != 0 || invented(s.path.substr(s.path.find_last_of('.') + 1)))
       continue;
-    const auto known = copied.find(s.handle);
-    const fstHandle h = declare(s.path.substr(skip), s.range, s.width, known == copied.end() ? 0 : known->second);
-    copied.emplace(s.handle, h);
+    if (s.handle >= copied.size()) copied.resize(s.handle + 1);
+    copied[s.handle] = declare(s.path.substr(skip), s.range, s.width, copied[s.handle]);
   }
   if (copied.empty()) throw WaveError("no scope " + root + " in the waves");
 
@@ -188,24 +187,24 @@ void write_trimmed(const FstReader& from, const std::string& root, uint64_t firs
     }
   };
   // What is there at the beginning, then what changes.
-  std::map<uint32_t, std::string> before;
+  std::vector<std::string> before(copied.size());
   auto begin = [&] {
     if (started) return;
     go_to(first);
-    for (const auto& value : before) fstWriterEmitValueChange(out, value.first, value.second.c_str());
+    for (size_t handle = 0; handle < before.size(); ++handle)
+      if (!before[handle].empty()) fstWriterEmitValueChange(out, copied[handle], before[handle].c_str());
   };
   uint64_t seen = 0;
   from.changes([&](uint64_t time, uint32_t handle, const char* bits) {
-    const auto to = copied.find(handle);
-    if (to == copied.end() || time > last) return;
+    if (handle >= copied.size() || copied[handle] == 0 || time > last) return;
     if (time <= first) {
-      before[to->second] = bits;
+      before[handle] = bits;
       return;
     }
     begin();
     if (time != seen) add_until(seen = time);
     go_to(time);
-    fstWriterEmitValueChange(out, to->second, bits);
+    fstWriterEmitValueChange(out, copied[handle], bits);
   });
   begin();
   add_until(last);

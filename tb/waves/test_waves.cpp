@@ -203,6 +203,8 @@ TEST_CASE("waves: first and last cells, sub-pixel planes, samples outside") {
     const golden::Config& config = engine.config;
     for (const Cell& cell : {Cell{0, 0, 0}, Cell{config.planes - 1, config.plane_cols - 1, config.plane_rows - 1},
                              Cell{config.planes / 2, 0, config.plane_rows - 1}}) {
+      // Of the large one the last cell: its plane is not the last lane's, so a lane rests.
+      if (config.lanes > 1 && cell.plane + 1 < config.planes) continue;
       const TemporaryDir dir;
       const Capture c = take(engine, cell, dir, PSWEEP_LAYOUTS, tb::Geometry::kSkewed);
       const std::vector<TableRow> rows = compare_cell(c, c.stimulus);
