@@ -66,6 +66,10 @@ waves: setup ## Waves of one cell, and its values at every stage   STAGE=similar
 	@scripts/build.sh psweep-waves
 	@scripts/waves.sh
 
+.PHONY: sim-large
+sim-large: setup ## One tile of 2048x2048 cells, and one of 1024 planes, through an engine of that size (a minute)
+	@scripts/large.sh
+
 .PHONY: formal
 formal: ## Prove properties of the clock crossings and other small circuits, and find the faults put into them
 	@scripts/setup.sh build formal
