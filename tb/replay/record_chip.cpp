@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// record_chip CHIP FILE: drives the Verilated chip with everything it knows and records its pins (recorder.hpp): ARP,
-// pings, capabilities, counters, a session with two tiles of random texture, a broken and a foreign frame, messages in
-// wrong order, a refused start; then, in half duplex, with collisions. Exit code 1 if the chip did not answer.
+// record_chip CHIP FILE GENERIC=VALUE ..: drives the Verilated chip with everything it knows and records its pins
+// (chip_recorder.hpp): ARP, pings, capabilities, counters, a session with two tiles of random texture, a broken and a
+// foreign frame, messages in wrong order, a refused start; then, in half duplex, with collisions. The generics are those
+// the chip was built with. Exit code 1 if the chip did not answer.
 #include <cstdio>
 #include <exception>
 #include <random>
@@ -11,7 +12,7 @@
 #include "chip/station.hpp"
 #include "net/client.hpp"
 #include "net/link_engine.hpp"
-#include "replay/recorder.hpp"
+#include "replay/chip_recorder.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;
@@ -44,11 +45,11 @@ std::vector<golden::PlaneEntry> shifts() {
   return table;
 }
 
-void run(const Chip& chip, const std::string& file) {
+void run(const Chip& chip, const std::string& file, const std::vector<std::string>& generics) {
   std::mt19937 random(1);
   DeskSettings settings;
   settings.clk_mhz = 30.7;  // near the lowest, so that few clocks have to be replayed
-  Desk desk(std::make_unique<Recorder>(chip.make(), file), settings);
+  Desk desk(std::make_unique<ChipRecorder>(chip.make(), file, generics), settings);
   const net::Address own{{2, 0, 0, 0, 0, 9}, chip.address.ip ^ 3, 4000};
   Station station(desk, own, chip.address.ip, chip.address.port);
   if (!station.resolve()) throw net::LinkError("no answer to ARP");
@@ -99,12 +100,12 @@ void run(const Chip& chip, const std::string& file) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::fprintf(stderr, "usage: record_chip CHIP FILE\n");
+  if (argc < 4) {
+    std::fprintf(stderr, "usage: record_chip CHIP FILE GENERIC=VALUE ..\n");
     return 2;
   }
   try {
-    run(chip_named(argv[1]), argv[2]);
+    run(chip_named(argv[1]), argv[2], std::vector<std::string>(argv + 3, argv + argc));
   } catch (const std::exception& e) {
     std::fprintf(stderr, "record_chip: %s\n", e.what());
     return 1;
