@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // record_chip CHIP FILE GENERIC=VALUE ..: drives the Verilated chip with everything it knows and records its pins
 // (chip_recorder.hpp): ARP, pings, capabilities, counters, a session with two tiles of random texture, a broken and a
-// foreign frame, messages in wrong order, a refused start; then, in half duplex, with collisions. The generics are those
-// the chip was built with. Exit code 1 if the chip did not answer.
+// foreign frame, messages in wrong order, a refused start; then, in half duplex, with collisions. The generics are
+// those the chip was built with. Exit code 1 if the chip did not answer.
 #include <cstdio>
 #include <exception>
 #include <random>

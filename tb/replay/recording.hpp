@@ -36,7 +36,9 @@ class Recording {
   void expect(int number, uint64_t value, uint64_t defined = ~uint64_t{0}) {
     Port& p = ports_[static_cast<size_t>(number)];
     for (int bit = 0; bit < p.bits; ++bit)
-      p.now[static_cast<size_t>(p.bits - 1 - bit)] = (defined >> bit & 1) == 0 ? '-' : (value >> bit & 1) != 0 ? '1' : '0';
+      p.now[static_cast<size_t>(p.bits - 1 - bit)] = (defined >> bit & 1) == 0 ? '-'
+                                                     : (value >> bit & 1) != 0 ? '1'
+                                                                               : '0';
   }
   // One character a clock: '1' if it rises at the end of the step. `count` equal steps.
   void step(const std::string& rising, uint64_t count = 1) {
