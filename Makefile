@@ -66,6 +66,12 @@ waves: setup ## Waves of one cell, and its values at every stage   STAGE=similar
 	@scripts/build.sh psweep-waves
 	@scripts/waves.sh
 
+.PHONY: wave-pictures
+wave-pictures: ## The pictures of docs/waves.md again, by GTKWave without a screen
+	@scripts/setup.sh build waves
+	@scripts/build.sh psweep-waves
+	@scripts/wave_pictures.sh
+
 .PHONY: sim-large
 sim-large: setup ## One tile of 2048x2048 cells, and one of 1024 planes, through an engine of that size (a minute)
 	@scripts/large.sh
@@ -103,6 +109,12 @@ link-speed: setup ## Goodput, latency, busy share of the engine and time of a wh
 link-table: setup ## RAM of the arbiter's buffers against stall clocks, for bands and tiles, duplex, clocks and lanes
 	@scripts/build.sh link_table
 	@build/link_table
+
+.PHONY: shape-table
+shape-table: setup ## Clocks of the paper's pair against memory, for bands and tiles of every shape (a minute)
+	@scripts/setup.sh build plots
+	@scripts/build.sh shape_table
+	@scripts/shape_table.sh
 
 .PHONY: fuzz
 fuzz: setup ## Random and mutated frames into the simulated chips, packets into the host   FRAMES=100000 SEED=n

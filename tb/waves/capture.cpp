@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <optional>
 
@@ -94,10 +95,11 @@ std::optional<std::pair<int, int>> part_of(const Capture& c, const LayoutSignal&
   if (s.bit >= 0) return std::make_pair(s.bit, 1);
   const int lanes = c.engine->config.lanes;
   if (s.lane && lanes > 1) return std::make_pair(c.lane * (width / lanes), width / lanes);
+  if (s.held) return std::make_pair(0, width);
   return std::nullopt;
 }
 std::string part_path(const LayoutGroup& group, const LayoutSignal& s) {
-  return group.module + '.' + group.name + '.' + (s.alias.empty() ? s.name : s.alias);
+  return group.module + '.' + group.name + (s.held ? ".held." : ".") + (s.alias.empty() ? s.name : s.alias);
 }
 
 uint64_t sub(uint64_t a, uint64_t b) { return a > b ? a - b : 0; }
@@ -221,6 +223,7 @@ Capture capture(const Engine& engine, const tb::Stimulus& stimulus, const Cell& 
     uint32_t from;
     int low, width;
     std::string path;
+    const LayoutGroup* held;  // nullptr: all values, else that at the cell's clock in this group
   };
   std::vector<Part> parts;
   for (const Layout& layout : layouts) {
@@ -236,9 +239,10 @@ Capture capture(const Engine& engine, const tb::Stimulus& stimulus, const Cell& 
         if (!found) throw WaveError(signal_error(layout, s, "no signal " + s.name + " in " + scope));
         const auto part = part_of(c, s, found->width);
         if (!part) continue;
+        if (s.held && !group.timed) throw WaveError(signal_error(layout, s, "held in a group without an offset"));
         if (part->first < 0 || part->first + part->second > found->width)
           throw WaveError(signal_error(layout, s, s.name + " has only " + std::to_string(found->width) + " bits"));
-        parts.push_back({found->handle, part->first, part->second, part_path(group, s)});
+        parts.push_back({found->handle, part->first, part->second, part_path(group, s), s.held ? &group : nullptr});
         wanted.push_back(found->handle);
       }
     }
@@ -246,7 +250,6 @@ Capture capture(const Engine& engine, const tb::Stimulus& stimulus, const Cell& 
   const Values values(full, wanted);
 
   std::array<uint64_t, kTaps> count = full_log.before;
-  std::optional<uint64_t> control_count;
   std::vector<std::pair<uint64_t, bool>> control;  // clock, and whether the set begins
   for (uint64_t clock = run.first; clock <= last; ++clock) {
     for (int tap = 0; tap < kTaps; ++tap)
@@ -284,12 +287,20 @@ Capture capture(const Engine& engine, const tb::Stimulus& stimulus, const Cell& 
   for (const Part& part : parts) {
     if (added.count(part.path)) continue;
     NewSignal s{part.path, part.width, {}};
-    for (const auto& [time, bits] : values.all(part.from)) {
-      if (time > c.last * kPicosecondsPerClock) break;
-      const std::string field =
-          bits.substr(bits.size() - static_cast<size_t>(part.low + part.width), static_cast<size_t>(part.width));
-      if (time <= c.first * kPicosecondsPerClock) s.changes.clear();
-      if (s.changes.empty() || s.changes.back().second != field) s.changes.emplace_back(time, field);
+    auto field = [&part](const std::string& bits) {
+      return bits.substr(bits.size() - static_cast<size_t>(part.low + part.width), static_cast<size_t>(part.width));
+    };
+    if (part.held) {
+      const uint64_t time = kPicosecondsPerClock * (c.here[static_cast<size_t>(base_of(part.held->module))] +
+                                                    static_cast<uint64_t>(part.held->offset));
+      s.changes.emplace_back(c.first * kPicosecondsPerClock, std::string(static_cast<size_t>(part.width), 'z'));
+      s.changes.emplace_back(time, field(values.bits(part.from, time)));
+    } else {
+      for (const auto& [time, bits] : values.all(part.from)) {
+        if (time > c.last * kPicosecondsPerClock) break;
+        if (time <= c.first * kPicosecondsPerClock) s.changes.clear();
+        if (s.changes.empty() || s.changes.back().second != field(bits)) s.changes.emplace_back(time, field(bits));
+      }
     }
     added.emplace(part.path, s);
   }
@@ -346,15 +357,16 @@ void write_save_file(const Capture& c, const Layout& layout, const std::string& 
     from = std::min(from, clock);
     to = std::max(to, clock);
   }
-  const size_t slash = c.fst.find_last_of('/');
+  // Both in full: GTKWave then finds the waves from any folder, and when both files were moved.
+  auto full = [](const std::string& name) { return std::filesystem::absolute(name).lexically_normal().string(); };
   out << "[*] psweep-waves: " << c.engine->name << ", " << layout.stage << ", plane " << c.cell.plane << ", cell "
       << c.cell.column << ',' << c.cell.row << '\n';
-  out << "[dumpfile] \"" << (slash == std::string::npos ? c.fst : c.fst.substr(slash + 1)) << "\"\n";
-  // About 1200 pixels are left for the waves; GTKWave's zoom is the negative binary logarithm of the time in 200.
-  const uint64_t around = whole ? 4 : 3;
-  const double per_pixel = static_cast<double>((to - from + 1 + 2 * around) * kPicosecondsPerClock) / 1200;
+  out << "[dumpfile] \"" << full(c.fst) << "\"\n[savefile] \"" << full(file) << "\"\n";
+  // About 1080 pixels are left for the waves; GTKWave's zoom is the negative binary logarithm of the time in 200.
+  const uint64_t around = layout.stage == "control" ? 12 : 3;
+  const double per_pixel = static_cast<double>((to - from + 1 + 2 * around) * kPicosecondsPerClock) / 1080;
   out << "[timestart] " << sub(from, around) * kPicosecondsPerClock << '\n';
-  out << "[size] 1600 1000\n[pos] -1 -1\n";
+  out << "[size] 1400 1000\n[pos] -1 -1\n";
   out << '*' << -std::log2(200 * per_pixel) << ' ' << to * kPicosecondsPerClock;
   for (int marker = 0; marker < 26; ++marker)
     out << ' '
@@ -385,7 +397,9 @@ void write_save_file(const Capture& c, const Layout& layout, const std::string& 
       // Behind the valid: whose it is.
       if (first && group.timed) {
         const std::string sideband = cell + group.module + '.' + group.name + '.';
-        if (group.name == "s" || group.name == "m" || group.name == "sweep") {
+        // In the whole engine's layout the plane and the row only where the way begins and ends.
+        const bool inner = whole && group.module != "u_control" && group.module != "u_updating";
+        if (!inner && (group.name == "s" || group.name == "m" || group.name == "sweep")) {
           show(sideband + "plane", "dec", 0, kOrange, "plane");
           show(sideband + "row", "sdec", 0, kOrange, "row");
         }

@@ -68,6 +68,8 @@ bool read_signal(std::istringstream& words, LayoutSignal& s, const std::map<std:
       s.format = word;
     } else if (word == "lane") {
       s.lane = true;
+    } else if (word == "held") {
+      s.held = true;
     } else if (starts_with(word, "bit=")) {
       s.bit = evaluate(word.substr(4), keys);
     } else if (starts_with(word, "as=")) {

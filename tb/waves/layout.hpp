@@ -4,11 +4,12 @@
 //   module NAME [lane]            instance whose signals follow; "lane": there is one per lane
 //   group NAME OFFSET [when=KEY=N] TITLE
 //                                 OFFSET: clocks behind the entity's input (control: its output); ".": not in step
-//     SIGNAL [FORMAT] [lane] [bit=N] [as=NAME] [when=KEY=N]
+//     SIGNAL [FORMAT] [lane] [held] [bit=N] [as=NAME] [when=KEY=N]
 //
 // FORMAT: bin (default), dec, sdec, hex, ufix(N), sfix(N) with N fraction bits. lane: of a bundle the field of the
-// cell's lane. bit=N: one bit. as=: shown under this name. when=: only in configurations with that number. Numbers may
-// be sums of numbers and keys of the configuration (and `lane`), such as 16+mncc_bits; {..} in SIGNAL likewise.
+// cell's lane. held: the value at the cell's clock, from that clock on. bit=N: one bit. as=: shown under this name.
+// when=: only in configurations with that number. Numbers may be sums of numbers and keys of the configuration (and
+// `lane`), such as 16+mncc_bits; {..} in SIGNAL likewise.
 #pragma once
 #include <map>
 #include <string>
@@ -20,7 +21,7 @@ struct LayoutSignal {
   int line = 0;
   std::string name, alias, format;  // format: bin, dec, sdec, hex, ufix or sfix
   int fraction = 0;                 // fraction bits
-  bool lane = false;
+  bool lane = false, held = false;
   int bit = -1;
 };
 struct LayoutGroup {
