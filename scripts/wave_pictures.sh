@@ -52,8 +52,8 @@ for stage in "${stages[@]}"; do
   viewer=''
   picture=docs/images/waves_$stage.png
   # Without title and tool bar; few colours are enough.
-  convert "$work/$stage.png" -gravity north -chop 0x110 +repage +dither -colors 32 -depth 8 -strip -define png:compression-level=9 \
-    "PNG8:$picture"
+  convert "$work/$stage.png" -gravity north -chop 0x110 +repage +dither -colors 32 -depth 8 -strip \
+    -define png:compression-level=9 "PNG8:$picture"
   size=$(stat -c %s "$picture")
   printf 'wave_pictures: %s, %s, %d bytes\n' "$picture" "$(identify -format '%wx%h' "$picture")" "$size"
   [ "$size" -le $most ] || die "$picture is larger than $most bytes"
