@@ -32,6 +32,10 @@ const Engine& engine_of(const std::string& name) {
 }
 
 struct SaveFile {
+  struct Group {
+    std::string valid, column;  // its first signal, and the cell's column if the group is in step with the samples
+  };
+  std::vector<Group> groups;
   std::vector<std::string> signals;
   std::vector<uint64_t> markers;  // ps
   uint64_t begin = 0;
@@ -39,8 +43,10 @@ struct SaveFile {
 SaveFile parse(std::istream& in) {
   SaveFile f;
   for (std::string line; std::getline(in, line);) {
-    if (line.empty() || line[0] == '@' || line[0] == '-') continue;
-    if (line.compare(0, 11, "[timestart]") == 0) {
+    if (line.empty() || line[0] == '@') continue;
+    if (line[0] == '-') {
+      if (line.size() > 1) f.groups.push_back({});
+    } else if (line.compare(0, 11, "[timestart]") == 0) {
       f.begin = std::stoull(line.substr(11));
     } else if (line[0] == '*') {
       std::istringstream words(line.substr(1));
@@ -52,6 +58,10 @@ SaveFile parse(std::istream& in) {
     } else if (line[0] != '[') {
       if (line[0] == '+') line = line.substr(line.find("} ") + 2);
       f.signals.push_back(line);
+      if (f.groups.empty()) continue;
+      SaveFile::Group& group = f.groups.back();
+      if (group.valid.empty()) group.valid = line;
+      if (line.find(".column[") != std::string::npos) group.column = line;
     }
   }
   return f;
@@ -96,6 +106,15 @@ int wrong_at(const std::vector<uint64_t>& markers, const Capture& c, const FstRe
   };
   auto u = [](int v) { return static_cast<uint64_t>(v); };
   int wrong = 0;
+  // Held values begin with the cell's clock.
+  for (const auto& [name, place] : {std::make_pair("u_address_generator.m.held.m_xi_left", 1),
+                                    std::make_pair("u_updating.m.held.dbg_map_best", 5)}) {
+    const uint32_t handle = waves.get(std::string("psweep.cell.") + name).handle;
+    const uint64_t time = markers[static_cast<size_t>(place)];
+    wrong += values.bits(handle, time - kPicosecondsPerClock)[0] != 'z';
+    wrong += values.bits(handle, time)[0] == 'z' ||
+             number(values.bits(handle, time)) != (place == 1 ? u(trace.left[sample].xi) & 0x1fff : u(map[0].best));
+  }
   wrong += field("sample_valid", markers[1]) != 1;
   wrong += field("xi_left", markers[1]) != (u(trace.left[sample].xi) & 0x1fff);
   wrong += field("fx_right", markers[1]) != u(trace.right[sample].fx);
@@ -121,6 +140,36 @@ Capture take(const Engine& engine, const Cell& cell, const TemporaryDir& dir,
              const std::string& layouts = PSWEEP_LAYOUTS, tb::Geometry geometry = tb::Geometry::kInside) {
   return capture(engine, stimulus_of(engine, test_seed(), geometry), cell, read_layouts(layouts, engine, cell),
                  (dir / "x.fst").string());
+}
+
+// The delays in the layouts: clock by clock, until the cell has passed, a group's valid is up exactly when the sideband
+// says that somebody is there (or, behind the window sums, somebody whose window is complete). How many groups agree.
+int groups_in_step(const SaveFile& save, const Capture& c, const FstReader& waves) {
+  std::map<std::string, uint32_t> handles;
+  for (const Signal& s : waves.signals()) handles[s.full()] = s.handle;
+  int agree = 0;
+  for (const SaveFile::Group& group : save.groups) {
+    if (group.column.empty()) continue;
+    std::string row = group.column, here = group.column;
+    row.replace(row.find(".column["), 8, ".row[");
+    here.erase(here.find(".column[")).append(".here");
+    const uint32_t v = handles.at(group.valid), x = handles.at(group.column), y = handles.at(row), h = handles.at(here);
+    const Values values(waves, {v, x, y, h});
+    bool all = true, complete = true, passed = false;
+    for (uint64_t clock = c.first; !passed && clock <= c.last; ++clock) {
+      const std::string &col = values.bits(x, clock * kPicosecondsPerClock),
+                        &line = values.bits(y, clock * kPicosecondsPerClock);
+      const bool valid = values.at_clock(v, clock) != 0, there = col[0] != 'x';
+      all &= valid == there;
+      complete &= valid == (there && col[0] == '0' && line[0] == '0');
+      passed = values.at_clock(h, clock) != 0;
+    }
+    INFO(group.valid << " and " << group.column);
+    CHECK(passed);
+    CHECK((all || complete));
+    ++agree;
+  }
+  return agree;
 }
 
 auto slashes(const std::string& text) { return std::count(text.begin(), text.end(), '/'); }
@@ -177,6 +226,9 @@ TEST_CASE("waves: every configuration, every stage") {
       CHECK(missing(save, waves).empty());
       REQUIRE(save.markers.size() == kPlaces);
       CHECK(wrong_at(save.markers, c, waves) == 0);
+      int timed = 0;
+      for (const LayoutGroup& group : layout.groups) timed += group.timed;
+      CHECK(groups_in_step(save, c, waves) == timed);
       CHECK(save.begin >= waves.start());
       CHECK(save.begin < save.markers.back());
       // The diagonal: the cell is at each stage for one clock, later from stage to stage.
