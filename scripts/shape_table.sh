@@ -30,9 +30,9 @@ set xrange [0:12]
 set yrange [0:820]
 set grid
 set key top right
-set label 'NG-MEDIUM 2.7 Mbit' at 2.7,600 rotate by 90 offset 0.6,0
+set label 'NG-MEDIUM' at 2.8,780
 set arrow from 2.7,0 to 2.7,820 nohead dt 2 lc rgb '#999999'
-set label 'Virtex-5QV 10.7 Mbit' at 10.7,430 rotate by 90 offset 0.6,0
+set label 'Virtex-5QV' at 10.6,560 right
 set arrow from 10.7,0 to 10.7,820 nohead dt 2 lc rgb '#999999'
 plot '$points' index 1 using 2:3 with lines lw 2 lc rgb '#b35900' title 'bands (figure 7), 1 lane', \
      '$points' index 0 using 2:3 with lines lw 2 lc rgb '#1f5fa8' title 'tiles, 1 lane', \
