@@ -429,7 +429,7 @@ sub test_mutant {
     my ($program, $binary, @filter) = test_parts($test);
     my ($code) = run($log, 900, 1, 'ninja', '-C', 'build', '-j1', $program);
     if ($code != 0) { $verdict = 'invalid'; last }
-    ($code) = run($log, 20 + 6 * $seconds{$test}, 1, $binary, '-a', @filter);
+    ($code) = run($log, 20 + 3 * $seconds{$test}, 1, $binary, '-a', @filter);
     if ($code == -1) { $verdict = 'killed, no end'; $by = $program; last }
     if ($code >= 126 && $code <= 127) { die "mutants: $program cannot be run: $log\n" }
     if ($code != 0) { $verdict = 'killed'; $by = $program; last }

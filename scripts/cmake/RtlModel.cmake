@@ -25,6 +25,7 @@ set(PSWEEP_VHDL_STANDARD --std=93c)
 # For builds with a purpose of their own (scripts/mutants.sh, scripts/coverage.sh).
 set(PSWEEP_VERILATOR_EXTRA "" CACHE STRING "Further options of Verilator")
 set(PSWEEP_FAST_OPTION -O3 CACHE STRING "Optimisation of models that are built for long runs")
+option(PSWEEP_COVERAGE "Models count which bits change (tb/support/coverage.hpp)" OFF)
 set(PSWEEP_RTL_MODEL_DIR ${CMAKE_CURRENT_LIST_DIR})
 # -Wall and every warning is an error, but for the waivers of ghdl_netlist.vlt.
 set(PSWEEP_VERILATOR_FLAGS -Wall -O3 --x-initial unique --x-assign unique ${PSWEEP_VERILATOR_EXTRA})
@@ -37,6 +38,12 @@ if(PSWEEP_HAVE_IF_CONVERSION)
                          --param=max-rtl-if-conversion-predictable-cost=200)
 endif()
 
+set(coverage_source)
+if(PSWEEP_COVERAGE)
+  list(APPEND PSWEEP_VERILATOR_FLAGS --coverage-toggle --coverage-underscore)
+  set(coverage_source ${PSWEEP_VERILATOR_ROOT}/include/verilated_cov.cpp)
+endif()
+
 # Newer versions print a page of statistics for every model.
 execute_process(COMMAND ${PSWEEP_VERILATOR} --version OUTPUT_VARIABLE PSWEEP_VERILATOR_VERSION)
 string(REGEX MATCH "[0-9]+\\.[0-9]+" PSWEEP_VERILATOR_VERSION "${PSWEEP_VERILATOR_VERSION}")
@@ -46,10 +53,10 @@ endif()
 
 # The run-time library comes with Verilator as source.
 add_library(verilated_rt STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated.cpp
-                                ${PSWEEP_VERILATOR_ROOT}/include/verilated_threads.cpp)
+                                ${PSWEEP_VERILATOR_ROOT}/include/verilated_threads.cpp ${coverage_source})
 target_include_directories(verilated_rt SYSTEM PUBLIC ${PSWEEP_VERILATOR_ROOT}/include
                                                       ${PSWEEP_VERILATOR_ROOT}/include/vltstd)
-target_compile_definitions(verilated_rt PUBLIC VM_COVERAGE=0 VM_SC=0)
+target_compile_definitions(verilated_rt PUBLIC VM_COVERAGE=$<BOOL:${PSWEEP_COVERAGE}> VM_SC=0)
 target_link_libraries(verilated_rt PUBLIC Threads::Threads)
 if(ZLIB_FOUND)
   add_library(verilated_rt_fst STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated_fst_c.cpp)

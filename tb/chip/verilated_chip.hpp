@@ -15,6 +15,7 @@
 
 #include "chip/chip_model.hpp"
 #include "golden/control.hpp"
+#include "support/coverage.hpp"
 
 namespace psweep::chip {
 
@@ -44,6 +45,7 @@ class VerilatedChip : public ChipModel {
   }
   ~VerilatedChip() override {
     close_wave();
+    tb::save_coverage(context_);
     dut_->final();
   }
 

@@ -10,6 +10,7 @@
 
 #include "rtl/registers.hpp"
 #include "rtl/rtl_engine.hpp"
+#include "support/coverage.hpp"
 
 namespace psweep::rtl {
 
@@ -33,7 +34,10 @@ class VerilatedEngine : public EngineModel {
     dut_->m_map_tready = 1;
     reset();
   }
-  ~VerilatedEngine() override { dut_->final(); }
+  ~VerilatedEngine() override {
+    tb::save_coverage(context_);
+    dut_->final();
+  }
 
   void set_table(const std::vector<golden::PlaneEntry>& table) override {
     table_ = table;

@@ -89,6 +89,7 @@ class Clocks {
 #if VM_TRACE
     if (trace_) trace_->close();
 #endif
+    save_coverage(context_);
     dut_->final();
   }
 

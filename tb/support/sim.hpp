@@ -20,6 +20,8 @@
 #include <string>
 #include <vector>
 
+#include "support/coverage.hpp"
+
 namespace psweep::tb {
 
 struct Agent {
@@ -55,6 +57,7 @@ class Sim : public CycleCounter {
 #if VM_TRACE
     if (trace_) trace_->close();
 #endif
+    save_coverage(context_);
     dut_->final();
   }
 

@@ -10,6 +10,7 @@
 #include "Vdelay_line_7_1.h"
 #include "Vdelay_line_9_13.h"
 #include "support/catch.hpp"
+#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -42,6 +43,7 @@ void random_words(unsigned width, size_t delay, double enabled) {
     if (way.size() > delay) way.pop_front();
     if (way.size() == delay) board.compare(dut.m_data, way.front(), {}, clock);
   }
+  save_coverage(context);
   dut.final();
   INFO(board.report());
   CHECK(board.ok());

@@ -10,6 +10,7 @@
 #include "Vdivider_6_9.h"
 #include "golden/similarity.hpp"
 #include "support/catch.hpp"
+#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -28,7 +29,10 @@ struct Bench {
   Scoreboard board{"quotient"};
 
   Bench(int num_width, int quot_width) : num_bits(num_width), quot_bits(quot_width) { dut.clk = 0; }
-  ~Bench() { dut.final(); }
+  ~Bench() {
+    save_coverage(context);
+    dut.final();
+  }
 
   void put(uint64_t num, uint64_t den) {
     if (den != 0)

@@ -8,6 +8,7 @@
 
 #include "Vram_2r_a.h"
 #include "support/catch.hpp"
+#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -54,6 +55,7 @@ TEST_CASE("ram_2r: two readers, one of which writes") {
     dut.clk = 1;
     dut.eval();
   }
+  save_coverage(context);
   dut.final();
   INFO(a.report() << b.report());
   CHECK((a.ok() && b.ok()));

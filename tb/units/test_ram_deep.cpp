@@ -14,6 +14,7 @@
 #include "Vram_deep_5_30720_0.h"
 #include "Vram_deep_7_600_0.h"
 #include "support/catch.hpp"
+#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -30,7 +31,10 @@ class Bench {
     context_.randSeed(static_cast<int>(seed | 1));
     dut_ = std::make_unique<Dut>(&context_);
   }
-  ~Bench() { dut_->final(); }
+  ~Bench() {
+    save_coverage(context_);
+    dut_->final();
+  }
 
   void clock(bool we, uint32_t waddr, uint32_t raddr) {
     const uint64_t data = (uint64_t{random_()} << 32 | random_()) & mask_;
