@@ -100,6 +100,14 @@ mac-opinion: ## The MAC against the MII models of cocotbext-eth in Icarus (fetch
 	@scripts/setup.sh build opinion
 	@scripts/mac_opinion.sh
 
+.PHONY: mutants
+mutants: setup ## Small faults in a copy of the RTL, one at a time: the tests have to find them   E=<entities> SEED=n COUNT=n
+	@scripts/mutants.sh $(if $(SEED),--seed $(SEED)) $(if $(COUNT),--count $(COUNT)) $(E)
+
+.PHONY: coverage
+coverage: setup ## Lines of VHDL (GHDL 4 or newer) and bits that the tests reach: build/coverage/
+	@scripts/coverage.sh
+
 .PHONY: link-speed
 link-speed: setup ## Goodput, latency, busy share of the engine and time of a whole pair, on the simulated chip
 	@scripts/build.sh link_speed test_goodput
