@@ -127,6 +127,14 @@ int wrong_at(const std::vector<uint64_t>& markers, const Capture& c, const FstRe
   wrong += field("sim_valid", markers[4]) != 1;
   wrong += field("sim_inside", markers[4]) != u(trace.similarity[cell].valid);
   wrong += field("sim_v", markers[4]) != u(trace.similarity[cell].v);
+  // Of bundles the field of the cell's lane.
+  auto own = [&](const std::string& name, uint64_t time) {
+    return number(values.bits(waves.get("psweep.cell." + name).handle, time));
+  };
+  if (trace.flags[sample].usable)
+    wrong += own("u_storage.m.held.m_p10_left", markers[2]) !=
+             u(golden::fetch(config, c.stimulus.left, trace.left[sample]).p10);
+  if (config.lanes > 1) wrong += own("u_updating.s.s_v", markers[4]) != u(trace.similarity[cell].v);
   wrong += field("map_we", markers[5], false) != 1;
   wrong += field("map_addr", markers[5], false) != cell;
   wrong += field("map_best", markers[5], false) != u(map[0].best);
