@@ -3,11 +3,12 @@
 #   cmake -D DIR=build/configs -D NAME=w9 [-D WINDOW=9] [-D PLANE_COLS=256] ... -P scripts/make_config.cmake
 # NAME: a-z, 0-9, _. All others are numbers; what is not given (or empty) comes from the defaults below. IMG_COLS and
 # IMG_ROWS default to the largest tile with its skirt, plus 2 for interpolation, plus DISPARITY columns (half of the
-# difference between the disparities of the nearest and the farthest plane).
-set(keys PLANE_COLS PLANE_ROWS PLANES WINDOW PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS LANES RECTIFIED)
-set(defaults 256 130 301 13 8 8 2 13 8 1 0)
-set(lowest 1 1 1 3 1 1 0 4 2 1 0)
-set(highest 4096 4096 1024 21 12 12 8 16 12 4 1)
+# difference between the disparities of the nearest and the farthest plane). WAVES=1: for `make waves`; slower.
+set(keys PLANE_COLS PLANE_ROWS PLANES WINDOW PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS LANES RECTIFIED
+         WAVES)
+set(defaults 256 130 301 13 8 8 2 13 8 1 0 0)
+set(lowest 1 1 1 3 1 1 0 4 2 1 0 0)
+set(highest 4096 4096 1024 21 12 12 8 16 12 4 1 1)
 
 if(NOT DIR)
   message(FATAL_ERROR "make_config: DIR=<folder> is missing")
@@ -45,6 +46,10 @@ endif()
 if("${IMG_ROWS}" STREQUAL "")
   math(EXPR IMG_ROWS "(${PLANE_ROWS} + ${WINDOW} + 1 + 1) / 2 * 2")
 endif()
+set(waves false)
+if(WAVES)
+  set(waves true)
+endif()
 foreach(key IMG_COLS IMG_ROWS)
   check_range(${key} 4 4096)
   math(EXPR odd "${${key}} % 2")
@@ -61,7 +66,7 @@ file(
   \"planes\": ${PLANES}, \"window\": ${WINDOW}, \"pix_bits\": ${PIX_BITS}, \"weight_bits\": ${WEIGHT_BITS},
   \"interp_frac\": ${INTERP_FRAC}, \"mncc_bits\": ${MNCC_BITS}, \"frac_bits\": ${FRAC_BITS}, \"lanes\": ${LANES},
   \"rectified\": ${RECTIFIED},
-  \"waves\": false
+  \"waves\": ${waves}
 }
 ")
 message(STATUS "make_config: wrote ${DIR}/${NAME}.json")
