@@ -25,10 +25,10 @@ tb::Stimulus stimulus_of(const Engine& engine, uint32_t seed, tb::Geometry geome
   return tb::StimulusMaker(c, seed).make(tb::Texture::kStereo, geometry, c.plane_cols, c.plane_rows, c.planes);
 }
 
-const Engine& engine_of(const std::string& name) {
+const Engine& engine_of(const char* name) {
   for (const Engine& e : engines())
     if (e.name == name) return e;
-  throw std::runtime_error("no engine " + name);
+  throw std::runtime_error(std::string("no engine ") + name);
 }
 
 struct SaveFile {
