@@ -129,7 +129,8 @@ int wrong_at(const std::vector<uint64_t>& markers, const Capture& c, const FstRe
   wrong += field("sim_v", markers[4]) != u(trace.similarity[cell].v);
   // Of bundles the field of the cell's lane.
   auto own = [&](const std::string& name, uint64_t time) {
-    return number(values.bits(waves.get("psweep.cell." + name).handle, time));
+    const std::string& bits = values.bits(waves.get("psweep.cell." + name).handle, time);
+    return bits[0] == 'z' ? ~uint64_t{0} : number(bits);  // z: held, and not there yet
   };
   if (trace.flags[sample].usable)
     wrong += own("u_storage.m.held.m_p10_left", markers[2]) !=
