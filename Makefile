@@ -45,6 +45,12 @@ sim-net: setup ## The simulated chip behind the kernel's network stack: ping, a 
 	@scripts/build.sh psweep psweep-sim
 	@scripts/sim_net.sh
 
+.PHONY: sim-gates
+sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recorded streams; broken cells are noticed
+	@scripts/setup.sh gates
+	@scripts/build.sh record_engine
+	@scripts/sim_gates.sh
+
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
 	@scripts/build.sh psweep

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian packages of scripts/packages.txt that are missing, and nothing else.
 #
-#   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, opinion, net, wire, waves
+#   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion, net, wire, waves
 #     --check  install nothing, name what is missing (exit code 1 if anything is)
 #     --list   print the package names
 #
@@ -23,7 +23,7 @@ for arg in "$@"; do
     --check) mode=check ;;
     --list) mode=list ;;
     -h | --help) usage; exit 0 ;;
-    build | lint | formal | opinion | net | wire | waves) groups+=("$arg") ;;
+    build | lint | formal | gates | opinion | net | wire | waves) groups+=("$arg") ;;
     *) die "unknown argument '$arg'; see scripts/setup.sh --help" ;;
   esac
 done
