@@ -13,7 +13,7 @@ die() { printf 'wave_pictures: %s\n' "$*" >&2; exit 1; }
 readonly most=80000 # bytes a picture may have
 readonly width=1400
 # Enough for all signals of a stage, or for those of its first groups where all of them are too many for a picture.
-declare -A height=([psweep]=1730 [control]=1110 [address_generator]=1370 [storage]=1500 [interpolation]=1400
+declare -A height=([psweep]=1720 [control]=1110 [address_generator]=1370 [storage]=1500 [interpolation]=1400
                    [similarity]=1400 [updating]=1400)
 stages=("$@")
 [ $# -gt 0 ] || stages=(psweep control address_generator storage interpolation similarity updating)
@@ -40,8 +40,8 @@ for stage in "${stages[@]}"; do
   build/psweep-waves --stage "$stage" --config tiny --out "$work" --no-table > /dev/null
   save=$(echo "$work/tiny_${stage}"_*.gtkw)
   sed -i "s/^\[size\].*/[size] $width ${height[$stage]}/; s/^\[pos\].*/[pos] 0 0/" "$save"
-  gtkwave --rcvar 'hide_sst on' --rcvar 'splash_disable on' --rcvar 'fontname_waves Monospace 9' \
-    --rcvar 'fontname_signals Monospace 9' -S /dev/null "$save" > "$work/gtkwave.log" 2>&1 &
+  gtkwave --rcvar 'hide_sst on' --rcvar 'splash_disable on' --rcvar 'fontname_waves DejaVu Sans Mono 9' \
+    --rcvar 'fontname_signals DejaVu Sans Mono 9' -S /dev/null "$save" > "$work/gtkwave.log" 2>&1 &
   viewer=$!
   window=$(timeout 30 xdotool search --sync --onlyvisible --name "^GTKWave - .*tiny_$stage" | tail -n 1) ||
     die "GTKWave shows no window: $(tail -n 1 "$work/gtkwave.log")"

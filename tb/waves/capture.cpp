@@ -364,7 +364,8 @@ void write_save_file(const Capture& c, const Layout& layout, const std::string& 
   out << "[dumpfile] \"" << full(c.fst) << "\"\n[savefile] \"" << full(file) << "\"\n";
   // About 1080 pixels are left for the waves; GTKWave's zoom is the negative binary logarithm of the time in 200.
   const uint64_t around = layout.stage == "control" ? 12 : 3;
-  const double per_pixel = static_cast<double>((to - from + 1 + 2 * around) * kPicosecondsPerClock) / 1080;
+  const uint64_t behind = whole ? kMargin - 1 : around;  // room for the last values
+  const double per_pixel = static_cast<double>((to - from + 1 + around + behind) * kPicosecondsPerClock) / 1080;
   out << "[timestart] " << sub(from, around) * kPicosecondsPerClock << '\n';
   out << "[size] 1400 1000\n[pos] -1 -1\n";
   out << '*' << -std::log2(200 * per_pixel) << ' ' << to * kPicosecondsPerClock;
