@@ -6,7 +6,7 @@ SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 
 BUILD := build
-export JOBS VERBOSE T SEED SETUP STAGE CFG PLANE CELL
+export JOBS VERBOSE T SEED SEEDS SETUP STAGE CFG PLANE CELL
 
 # Everything that `make config` passes on to scripts/make_config.cmake.
 CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
@@ -44,6 +44,10 @@ sim-net: setup ## The simulated chip behind the kernel's network stack: ping, a 
 	@scripts/setup.sh net
 	@scripts/build.sh psweep psweep-sim
 	@scripts/sim_net.sh
+
+.PHONY: sim-ghdl
+sim-ghdl: build ## More recorded streams on the original VHDL in GHDL: every configuration, more tiles   SEEDS='2 3'
+	@scripts/sim_ghdl.sh
 
 .PHONY: sim-gates
 sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recorded streams; broken cells are noticed
