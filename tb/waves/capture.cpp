@@ -11,8 +11,8 @@
 namespace psweep::waves {
 namespace {
 
-constexpr uint64_t kMargin = 12;  // clocks in the file before the first sample and behind the write
-constexpr uint64_t kLead = 100;   // clocks in the full dump before the first sample of the set
+// Clocks in the file before the first sample and behind the write; before: also in the full dump before the set.
+constexpr uint64_t kMargin = 12, kBehind = 24, kLead = 100;
 constexpr int kColumnBits = 14, kPlaneBits = 11;
 
 std::string signal_error(const Layout& layout, const LayoutSignal& s, const std::string& problem) {
@@ -201,7 +201,7 @@ Capture capture(const Engine& engine, const tb::Stimulus& stimulus, const Cell& 
   // Second run: the same with waves, from the beginning of the set on.
   run.fst = file + ".full";
   run.first = sub(log.clocks[kSample][0], kLead);
-  run.last = c.here[kMapWrite] + kMargin + kLead;
+  run.last = c.here[kMapWrite] + kBehind;
   const RunLog full_log = engine.run(config, run);
   const FstReader full(run.fst);
   if (full_log.clocks != log.clocks) throw WaveError("two runs differ");
@@ -269,7 +269,7 @@ Capture capture(const Engine& engine, const tb::Stimulus& stimulus, const Cell& 
     if (number == static_cast<int64_t>(window_end)) c.here[kControlOut] = beat->first;
   }
   c.first = std::max(run.first, sub(c.entered[kControlOut], kMargin));
-  c.last = std::min(last, c.here[kMapWrite] + kMargin);
+  c.last = std::min(last, c.here[kMapWrite] + kBehind);
 
   // The delays in the layouts are those of the hardware: what leaves an entity by its layout enters the next one.
   for (const Layout& layout : layouts) {
@@ -364,7 +364,8 @@ void write_save_file(const Capture& c, const Layout& layout, const std::string& 
   out << "[dumpfile] \"" << full(c.fst) << "\"\n[savefile] \"" << full(file) << "\"\n";
   // About 1080 pixels are left for the waves; GTKWave's zoom is the negative binary logarithm of the time in 200.
   const uint64_t around = layout.stage == "control" ? 12 : 3;
-  const uint64_t behind = whole ? kMargin - 1 : around;  // room for the last values
+  const uint64_t behind =
+      whole ? kBehind / 2 : around;  // room for the last values; GTKWave shows nothing beyond the end
   const double per_pixel = static_cast<double>((to - from + 1 + around + behind) * kPicosecondsPerClock) / 1080;
   out << "[timestart] " << sub(from, around) * kPicosecondsPerClock << '\n';
   out << "[size] 1400 1000\n[pos] -1 -1\n";

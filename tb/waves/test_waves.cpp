@@ -215,7 +215,7 @@ TEST_CASE("waves: every configuration, every stage") {
     CHECK(way > static_cast<uint64_t>(config.window - 1) * static_cast<uint64_t>(config.plane_cols));
     CHECK(c.first < c.entered[kControlOut]);
     CHECK(c.last > c.here[kMapWrite]);
-    CHECK(c.last - c.first <= way + 24);
+    CHECK(c.last - c.first <= way + 36);
     CHECK(waves.start() == c.first * kPicosecondsPerClock);
     CHECK(waves.end() / kPicosecondsPerClock == c.last);
     CHECK(!std::ifstream(c.fst + ".full"));
