@@ -28,7 +28,8 @@ done
 [ ${#names[@]} -gt 0 ] || names=(tiny odd_2)
 out=${out:-$build/sim-gates}
 for program in yosys iverilog vvp perl; do
-  command -v $program > /dev/null || { echo "sim_gates.sh: $program is missing; see scripts/setup.sh gates" >&2; exit 2; }
+  command -v $program > /dev/null ||
+    { echo "sim_gates.sh: $program is missing; see scripts/setup.sh gates" >&2; exit 2; }
 done
 [ -x "$build/tb/replay/record_engine" ] || { echo "sim_gates.sh: make build first ($build)" >&2; exit 2; }
 # Debian's yosys comes without yosys-config; the cell models lie beside the program.
@@ -37,7 +38,8 @@ cells=$(dirname "$(dirname "$(readlink -f "$(command -v yosys)")")")/share/yosys
 
 compile() { # compile PROGRAM NETLIST DIR: true if Icarus takes it without a word
   local log
-  log=$(iverilog -g2005 -o "$1" -s replay "$3/bench.v" "$2" tb/gates/block_rams.v "$3/cells.v" 2>&1) && [ -z "$log" ] && return
+  log=$(iverilog -g2005 -o "$1" -s replay "$3/bench.v" "$2" tb/gates/block_rams.v "$3/cells.v" 2>&1) &&
+    [ -z "$log" ] && return
   echo "iverilog: $log"
   return 1
 }
@@ -67,7 +69,8 @@ gates() { # one configuration
   if [ -n "${VERBOSE:-}" ]; then
     yosys "$dir/synth.ys" || return 1
   else
-    yosys -q -l "$dir/yosys.log" "$dir/synth.ys" > "$dir/messages.log" 2>&1 || { tail -n 5 "$dir/messages.log"; return 1; }
+    yosys -q -l "$dir/yosys.log" "$dir/synth.ys" > "$dir/messages.log" 2>&1 ||
+      { tail -n 5 "$dir/messages.log"; return 1; }
   fi
   echo "netlist after $((SECONDS - begun)) s:"
   sed -nE 's/^ +(([A-Z][A-Z0-9]+) +[0-9]+|([0-9]+) +([A-Z][A-Z0-9]+))$/  \1/p' "$dir/stat.txt"
@@ -80,16 +83,16 @@ gates() { # one configuration
   echo "the netlist is bit-exact ($((SECONDS - begun)) s)"
 }
 
-# fault KIND SUBSTITUTION: breaks one cell of a kind, the middle one or, if nobody ever uses what that one does, one
-# of the four behind it.
+# fault KIND SUBSTITUTION: breaks one cell of a kind, the middle one; if nobody ever sees what that one does, up to four
+# others in turn.
 fault() {
   local kind=$1 dir=$out/${names[0]} number
-  for number in 0 1 2 3 4; do
+  for number in 5 3 7 2 8; do
     KIND=$kind NUMBER=$number perl -0pe '
       my $kind = $ENV{KIND};
       my @at;
       push @at, $-[0] while /^  \Q$kind\E (?:#\(.*?\) )?\S+ +\(.*?\);\n/msg;
-      my $from = $at[@at / 2 + $ENV{NUMBER}] // die "there are not so many $kind\n";
+      my $from = $at[@at * $ENV{NUMBER} / 10] // die "there is no $kind\n";
       my $cell = substr($_, $from);
       $cell =~ s/^(.*?\);\n)//s;
       my ($broken, $rest) = ($1, $cell);
