@@ -10,6 +10,10 @@ case ${1:-} in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
 esac
 die() { printf 'wave_pictures: %s\n' "$*" >&2; exit 1; }
+[ -x build/psweep-waves ] || die 'build/psweep-waves is missing; make wave-pictures builds it'
+for tool in gtkwave Xvfb xdotool convert; do
+  command -v "$tool" > /dev/null || die "$tool is missing; scripts/setup.sh waves installs it"
+done
 readonly most=80000 # bytes a picture may have
 readonly width=1400
 # Enough for all signals of a stage, or for those of its first groups where all of them are too many for a picture.

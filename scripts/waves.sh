@@ -11,6 +11,7 @@ cd "$(dirname "$0")/.."
 case ${1:-} in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
 esac
+[ -x build/psweep-waves ] || { echo 'waves: build/psweep-waves is missing; make waves builds it' >&2; exit 1; }
 mkdir -p build/waves
 options=(--out build/waves)
 if [ -n "${CFG:-}" ]; then options+=(--config "$CFG"); fi

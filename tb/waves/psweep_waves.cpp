@@ -17,6 +17,7 @@ struct Options {
               geometry = "inside";
   std::optional<int> plane;
   uint32_t seed = 1;
+  std::optional<uint32_t> model_seed;
   bool window = false, list = false, no_table = false;
 };
 
@@ -48,8 +49,10 @@ int run(const Options& o) {
       static_cast<tb::Texture>(index_of({"stereo", "random", "constant", "saturated"}, o.texture, "texture"));
   const auto geometry =
       static_cast<tb::Geometry>(index_of({"inside", "border", "skewed", "lost"}, o.geometry, "geometry"));
-  const tb::Stimulus stimulus =
-      tb::StimulusMaker(config, o.seed).make(texture, geometry, config.plane_cols, config.plane_rows, config.planes);
+  auto stimulus_of = [&](uint32_t seed) {
+    return tb::StimulusMaker(config, seed).make(texture, geometry, config.plane_cols, config.plane_rows, config.planes);
+  };
+  const tb::Stimulus stimulus = stimulus_of(o.seed), model = stimulus_of(o.model_seed.value_or(o.seed));
   Cell cell{o.plane.value_or(config.planes / 2), config.plane_cols / 2, config.plane_rows / 2};
   char rest = 0;
   if (!o.cell.empty() && std::sscanf(o.cell.c_str(), "%d,%d%c", &cell.column, &cell.row, &rest) != 2)
@@ -61,10 +64,10 @@ int run(const Options& o) {
   const std::vector<Layout> layouts = read_layouts(o.layouts, engine, cell);
   const Capture c = capture(engine, stimulus, cell, layouts, base + ".fst");
   write_save_file(c, layouts[static_cast<size_t>(stage)], base + ".gtkw");
-  const std::vector<TableRow> rows = compare_cell(c, stimulus);
+  const std::vector<TableRow> rows = compare_cell(c, model);
   std::printf("%s: %s, seed %u\n", engine.name.c_str(), stimulus.name.c_str(), o.seed);
   if (!o.no_table) std::fputs(table_text(c, rows).c_str(), stdout);
-  if (o.window) std::fputs(window_text(c, stimulus).c_str(), stdout);
+  if (o.window) std::fputs(window_text(c, model).c_str(), stdout);
   for (int place = 0; place < kPlaces; ++place)
     std::printf("marker %c: clock %llu, %s\n", 'A' + place,
                 static_cast<unsigned long long>(c.here[static_cast<size_t>(place)]), place_name(place));
@@ -91,6 +94,7 @@ int main_function(int argc, char** argv) {
   app.add_option("--geometry", o.geometry, "Planes: inside, border, skewed (sub-pixel, unequal steps), lost")
       ->capture_default_str();
   app.add_option("--seed", o.seed, "Of the images")->capture_default_str();
+  app.add_option("--model-seed", o.model_seed, "Other images for the model: what differences look like");
   app.add_flag("--window", o.window, "Also the samples of the cell's window");
   app.add_flag("--no-table", o.no_table, "Without the table (the values are compared all the same)");
   app.add_option("--layouts", o.layouts, "Folder of the layouts (<stage>.waves)")->capture_default_str();

@@ -377,6 +377,12 @@ TEST_CASE("waves: the program") {
   CHECK(good.text.find("tiny, plane 3, cell 15,0: 52 of 52 values equal") != std::string::npos);
   CHECK(std::ifstream(dir / "tiny_storage_p3_c15_0.fst"));
   CHECK(std::ifstream(dir / "tiny_storage_p3_c15_0.gtkw"));
+  // Differences: exit code 1.
+  const Outcome other = call("--plane 3 --cell 15,0 --model-seed 7", dir);
+  INFO(other.text);
+  CHECK(other.code == 1);
+  CHECK(other.text.find("<-- differs") != std::string::npos);
+  CHECK(other.text.find("values differ from the model") != std::string::npos);
   const struct {
     const char *arguments, *message;
   } bad[] = {
