@@ -10,6 +10,9 @@
 --   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
 --   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
 --              work the address of a write is not looked at. A last map beat beats an abort in the same clock
+--   Upsets   : the state has a parity bit: no upset of one bit makes another state of it. A code without a name and a
+--              map that ends before or after its last beat drop the tile (error bit 'upset'). Sets are
+--              counted to 'not below', so that no upset makes a tile longer than the largest of the build
 --   Counters : saturating; clear also resets the latch that counts window errors once a tile. tile_clocks is kept
 --   Reset    : idle, sizes missing, table empty, counters 0; bounds are not reset: write them before the first start
 --   Golden   : sw/golden/control.hpp
@@ -27,7 +30,8 @@ entity control is
     G_PLANES     : integer := 301;
     G_WINDOW     : integer := 13;
     G_MNCC_W     : integer := 13;
-    G_LANES      : integer := 1
+    G_LANES      : integer := 1;
+    G_LATENCY    : integer := 60
   );
   port (
     clk : in  std_logic;
@@ -79,7 +83,8 @@ entity control is
     map_start  : out std_logic; -- pulse with the first sample of a tile
     map_unload : out std_logic; -- pulse: all planes are in the map
     map_abort  : out std_logic; -- pulse: forget everything on its way
-    plane_done : in  std_logic; -- pulse: one more set of planes is in the map
+    map_more   : in  std_logic; -- map beats will follow the present one
+    map_valid  : in  std_logic; -- a map beat is there
     map_last   : in  std_logic; -- the last map beat is being taken
 
     window_error : in  std_logic_vector(G_LANES - 1 downto 0); -- of address_generator, one a sample
@@ -104,12 +109,22 @@ architecture rtl of control is
   constant C_ROW_W       : integer := clog2(imax(G_IMG_ROWS, C_SWEEP_ROWS));
   constant C_PLANE_W     : integer := clog2(G_PLANES);
   constant C_LANE_W      : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
-  constant C_SET_W       : integer := clog2(plane_sets(G_PLANES, G_LANES));
+  constant C_SETS        : integer := plane_sets(G_PLANES, G_LANES);
+  constant C_SET_W       : integer := clog2(C_SETS);
   constant C_TABLE_W     : integer := C_PLANE_W + 3;
   constant C_TABLE_WORDS : integer := 8 * G_PLANES;
-  -- Planes on their way from here to the map: a plane takes at least C_ROW_MIN * 3 clocks, so the pipeline (about 100)
-  -- holds fewer than 15.
-  constant C_FLIGHT_W    : integer := 4;
+  -- The last cell is in the map so many clocks after the last sample. (A count of planes on their way would wait for
+  -- ever, were one of its bits upset.)
+  constant C_FLUSH       : integer := G_LATENCY + 1;
+  constant C_FLUSH_W     : integer := 7;
+
+  -- The state with even parity: whichever bit is upset, the code is none of these.
+  constant C_IDLE     : std_logic_vector(3 downto 0) := C_STATE_IDLE & '0';
+  constant C_LOAD     : std_logic_vector(3 downto 0) := C_STATE_LOAD & '1';
+  constant C_SWEEP    : std_logic_vector(3 downto 0) := C_STATE_SWEEP & '1';
+  constant C_FLUSHING : std_logic_vector(3 downto 0) := C_STATE_FLUSH & '0';
+  constant C_UNLOAD   : std_logic_vector(3 downto 0) := C_STATE_UNLOAD & '1';
+  constant C_DRAIN    : std_logic_vector(3 downto 0) := C_STATE_DRAIN & '0';
 
   -- Registers.
   constant C_COMMAND   : integer := 16#00#;
@@ -123,7 +138,7 @@ architecture rtl of control is
   constant C_LEFT      : integer := 16#10#; -- x_lo, x_hi, y_lo, y_hi
   constant C_RIGHT     : integer := 16#14#;
 
-  signal state_q    : std_logic_vector(2 downto 0);
+  signal state_q    : std_logic_vector(3 downto 0);
   signal is_idle    : std_logic;
   signal is_load    : std_logic;
   signal is_sweep   : std_logic;
@@ -184,7 +199,7 @@ architecture rtl of control is
   signal pix_ready   : std_logic;
   signal pix_fire    : std_logic;
   signal load_done   : std_logic;
-  signal in_flight   : unsigned(C_FLIGHT_W - 1 downto 0);
+  signal since_last  : unsigned(C_FLUSH_W - 1 downto 0); -- clocks since the last sample of a plane, up to C_FLUSH
   signal flushed     : std_logic;
   signal abort_q     : std_logic;
   signal start_q     : std_logic;
@@ -196,7 +211,7 @@ architecture rtl of control is
   signal table_bad   : std_logic;
   signal window_seen : std_logic; -- in this tile
 
-  -- Error events. One of the first four comes from s_cfg, one of the others from the tile: at most two a clock.
+  -- Error events. One of the first four comes from s_cfg, the others from the tile count as one: at most two a clock.
   signal event_config  : std_logic;
   signal event_table   : std_logic;
   signal event_address : std_logic;
@@ -204,6 +219,7 @@ architecture rtl of control is
   signal event_short   : std_logic;
   signal event_long    : std_logic;
   signal event_window  : std_logic;
+  signal event_upset   : std_logic;
   signal cfg_event     : std_logic;
   signal tile_event    : std_logic;
   signal new_events    : unsigned(1 downto 0);
@@ -254,13 +270,16 @@ begin
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
     report "control: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
     severity failure;
+  assert G_LATENCY >= 1 and G_LATENCY <= 126
+    report "control: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..126"
+    severity failure;
 
-  is_idle   <= to_bit(state_q = C_STATE_IDLE);
-  is_load   <= to_bit(state_q = C_STATE_LOAD);
-  is_sweep  <= to_bit(state_q = C_STATE_SWEEP);
-  is_flush  <= to_bit(state_q = C_STATE_FLUSH);
-  is_unload <= to_bit(state_q = C_STATE_UNLOAD);
-  is_drain  <= to_bit(state_q = C_STATE_DRAIN);
+  is_idle   <= to_bit(state_q = C_IDLE);
+  is_load   <= to_bit(state_q = C_LOAD);
+  is_sweep  <= to_bit(state_q = C_SWEEP);
+  is_flush  <= to_bit(state_q = C_FLUSHING);
+  is_unload <= to_bit(state_q = C_UNLOAD);
+  is_drain  <= to_bit(state_q = C_DRAIN);
 
   -- Register writes --------------------------------------------------------------------------------------------------
   s_cfg_tready  <= '1';
@@ -400,17 +419,22 @@ begin
   at_last     <= at_col_end and at_row_end;
   last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
   last_set    <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
-  at_set_end  <= to_bit(plane_set = last_set);
+  -- 'Not below' and the second comparison are for an upset bit: no tile sweeps more sets than the table has.
+  at_set_end  <= to_bit(plane_set >= last_set or plane_set = C_SETS - 1);
   at_tile_end <= is_sweep and at_last and at_set_end;
   step        <= pix_fire or is_sweep;
   load_done   <= pix_fire and at_last and s_pix_tlast;
   event_short <= pix_fire and s_pix_tlast and not at_last;
   event_long  <= pix_fire and at_last and not s_pix_tlast;
   sample_last <= active and at_row_end and to_bit(col = sweep_last_col);
-  flushed     <= is_flush and to_bit(in_flight = 0);
-  tile_done   <= is_unload and map_last;
+  flushed     <= is_flush and to_bit(since_last = C_FLUSH);
+  tile_done   <= is_unload and map_last and not map_more;
+  -- What cannot be unless a bit was upset: a state without a name, or a map that ends before or after its last beat.
+  event_upset <= not (is_idle or is_load or is_sweep or is_flush or is_unload or is_drain)
+                 or (is_unload and not map_more and not map_valid)
+                 or (map_last and map_more);
   -- A drained tile was counted when it was refused.
-  tile_drop   <= event_config or event_table or event_short or event_long
+  tile_drop   <= event_config or event_table or event_short or event_long or event_upset
                  or (command_abort and not is_idle and not is_drain and not tile_done and not event_short
                      and not event_long);
 
@@ -418,41 +442,41 @@ begin
   begin
     if rising_edge(clk) then
       start_q <= load_done and not command_abort;
-      abort_q <= command_abort;
+      abort_q <= command_abort or event_upset;
 
       if is_idle = '1' then
         if start_ok = '1' then
-          state_q <= C_STATE_LOAD;
+          state_q <= C_LOAD;
         elsif event_config = '1' or event_table = '1' then
-          state_q <= C_STATE_DRAIN;
+          state_q <= C_DRAIN;
         end if;
       elsif is_load = '1' then
         if load_done = '1' then
-          state_q <= C_STATE_SWEEP;
+          state_q <= C_SWEEP;
         elsif event_short = '1' then
-          state_q <= C_STATE_IDLE;
+          state_q <= C_IDLE;
         elsif event_long = '1' then
-          state_q <= C_STATE_DRAIN;
+          state_q <= C_DRAIN;
         end if;
       elsif is_sweep = '1' then
         if at_tile_end = '1' then
-          state_q <= C_STATE_FLUSH;
+          state_q <= C_FLUSHING;
         end if;
       elsif is_flush = '1' then
         if flushed = '1' then
-          state_q <= C_STATE_UNLOAD;
+          state_q <= C_UNLOAD;
         end if;
       elsif is_unload = '1' then
         if tile_done = '1' then
-          state_q <= C_STATE_IDLE;
+          state_q <= C_IDLE;
         end if;
-      else
+      elsif is_drain = '1' then
         if s_pix_tvalid = '1' and s_pix_tlast = '1' then
-          state_q <= C_STATE_IDLE;
+          state_q <= C_IDLE;
         end if;
       end if;
-      if rst = '1' or command_abort = '1' then
-        state_q <= C_STATE_IDLE;
+      if rst = '1' or command_abort = '1' or event_upset = '1' then
+        state_q <= C_IDLE;
       end if;
 
       -- Counters come back to 0 by themselves at the end of load and of every plane.
@@ -494,22 +518,20 @@ begin
         active <= '0';
       end if;
 
-      if is_sweep = '1' and at_last = '1' and plane_done = '0' then
-        in_flight <= in_flight + 1;
-      elsif plane_done = '1' and not (is_sweep = '1' and at_last = '1') then
-        in_flight <= in_flight - 1;
+      if sample_last = '1' then
+        since_last <= (others => '0');
+      elsif since_last /= C_FLUSH then
+        since_last <= since_last + 1;
       end if;
 
-      if rst = '1' or command_abort = '1' then
+      if rst = '1' or command_abort = '1' or event_upset = '1' then
         row_first <= '0';
         active    <= '0';
         start_q   <= '0';
       end if;
-      if rst = '1' or is_idle = '1' then
-        in_flight <= (others => '0');
-      end if;
       if rst = '1' then
-        abort_q <= '0';
+        abort_q    <= '0';
+        since_last <= (others => '0');
       end if;
     end if;
   end process p_sequence;
@@ -549,7 +571,7 @@ begin
   window_errors_next <= ('0' & window_errors_q) + samples_lost;
   event_window     <= sample_lost and not window_seen;
   cfg_event        <= event_config or event_table or event_address or event_busy;
-  tile_event       <= event_short or event_long or event_window;
+  tile_event       <= event_short or event_long or event_window or event_upset;
   error_count_next <= ('0' & error_count_q) + new_events;
 
   p_status : process (clk)
@@ -562,6 +584,7 @@ begin
       error_bits(C_ERROR_WINDOW)  <= error_bits(C_ERROR_WINDOW) or event_window;
       error_bits(C_ERROR_ADDRESS) <= error_bits(C_ERROR_ADDRESS) or event_address;
       error_bits(C_ERROR_BUSY)    <= error_bits(C_ERROR_BUSY) or event_busy;
+      error_bits(C_ERROR_UPSET)   <= error_bits(C_ERROR_UPSET) or event_upset;
       -- Counted a clock later: the way from s_cfg through the table's checks is long enough.
       new_events <= (cfg_event and tile_event) & (cfg_event xor tile_event);
       if error_count_next(16) = '0' then
@@ -599,6 +622,7 @@ begin
         error_bits(C_ERROR_LONG)     <= event_long;
         error_bits(C_ERROR_WINDOW)   <= event_window;
         error_bits(C_ERROR_BUSY)     <= event_busy;
+        error_bits(C_ERROR_UPSET)    <= event_upset;
         error_count_q                <= (others => '0');
         tiles_done_q(15 downto 1)    <= (others => '0');
         tiles_done_q(0)              <= tile_done;
@@ -625,7 +649,7 @@ begin
     end if;
   end process p_status;
 
-  state         <= state_q;
+  state         <= state_q(3 downto 1);
   busy          <= not is_idle;
   errors        <= error_bits;
   error_count   <= std_logic_vector(error_count_q);

@@ -115,6 +115,9 @@ architecture rtl of psweep is
   constant C_SET_W    : integer := clog2(C_SETS);
   constant C_BANK_W   : integer := clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED));
   constant C_SAMPLE_W : integer := G_PIX_W + G_INTERP_F;
+  -- From a sample's strobe to the write of the cell that it completes.
+  constant C_LATENCY  : integer := C_ADDRESS_LATENCY + C_STORAGE_LATENCY + interpolation_latency(G_RECTIFIED)
+                                   + similarity_latency(G_MNCC_W) + updating_latency(G_FRAC_W, G_LANES);
 
   signal pipe_rst : std_logic; -- also an abort clears what is on its way
 
@@ -153,7 +156,7 @@ architecture rtl of psweep is
   signal map_start         : std_logic;
   signal map_unload        : std_logic;
   signal map_abort         : std_logic;
-  signal plane_done        : std_logic;
+  signal map_more          : std_logic;
   signal map_valid         : std_logic;
   signal unload_done       : std_logic;
   signal map_ready         : std_logic;
@@ -232,7 +235,8 @@ begin
       G_PLANES     => G_PLANES,
       G_WINDOW     => G_WINDOW,
       G_MNCC_W     => G_MNCC_W,
-      G_LANES      => G_LANES
+      G_LANES      => G_LANES,
+      G_LATENCY    => C_LATENCY
     )
     port map (
       clk           => clk,
@@ -272,7 +276,8 @@ begin
       map_start     => map_start,
       map_unload    => map_unload,
       map_abort     => map_abort,
-      plane_done    => plane_done,
+      map_more      => map_more,
+      map_valid     => map_valid,
       map_last      => unload_done,
       window_error  => address_window_error,
       state         => state,
@@ -494,8 +499,8 @@ begin
       s_textured         => cell_textured,
       s_v                => cell_v,
       threshold          => threshold,
-      plane_done         => plane_done,
       unload             => map_unload,
+      unload_more        => map_more,
       unload_done        => unload_done,
       m_tvalid           => map_valid,
       m_tready           => map_ready,

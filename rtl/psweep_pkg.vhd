@@ -34,6 +34,7 @@ package psweep_pkg is
   constant C_ERROR_WINDOW  : natural := 4;
   constant C_ERROR_ADDRESS : natural := 5;
   constant C_ERROR_BUSY    : natural := 6;
+  constant C_ERROR_UPSET   : natural := 7;
 
   -- Latencies, first input to first output.
   constant C_ADDRESS_LATENCY       : positive := 9; -- row strobe to position

@@ -44,8 +44,8 @@ entity updating is
     s_v        : in  std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
     threshold  : in  std_logic_vector(G_MNCC_W - 1 downto 0); -- static during a tile
 
-    plane_done  : out std_logic; -- pulse: the last cell of a set is in the map
-    unload      : in  std_logic; -- pulse, behind the plane_done of the last plane
+    unload      : in  std_logic; -- pulse, when the last cell of the last set is in the map
+    unload_more : out std_logic; -- beats will follow the one on m_*
     unload_done : out std_logic; -- the last beat is being taken
 
     m_tvalid : out std_logic;
@@ -449,7 +449,6 @@ begin
       if waited(C_WORD_W) = '1' then
         write_word(G_FRAC_W + 1 downto 2) <= quot;
       end if;
-      plane_done <= way_valid(G_FRAC_W) and way_last(G_FRAC_W);
       if way_valid(G_FRAC_W) = '1' then
         if way_last(G_FRAC_W) = '1' then
           write_cell <= (others => '0');
@@ -459,7 +458,6 @@ begin
       end if;
       if clear = '1' then
         way_valid  <= (others => '0');
-        plane_done <= '0';
         write_cell <= (others => '0');
       end if;
     end if;
@@ -525,6 +523,7 @@ begin
   m_tvalid    <= beat_valid;
   m_tlast     <= beat(C_DATA_W);
   m_tdata     <= beat(C_DATA_W - 1 downto 0);
+  unload_more <= unloading or fetched;
   unload_done <= beat_valid and m_tready and beat(C_DATA_W);
 
 end architecture rtl;

@@ -115,7 +115,7 @@ field("status_table", ProtoField.uint16, "status.table", "Table")
 field("status_table_words", ProtoField.uint16, "status.table_words", "Table words written")
 field("status_cells", ProtoField.uint32, "status.cells", "Cells in the map buffer")
 field("status_errors", ProtoField.uint16, "status.errors", "Engine errors", base.HEX)
-local error_names = { "config", "table", "short", "long", "window", "address", "busy" }
+local error_names = { "config", "table", "short", "long", "window", "address", "busy", "upset" }
 for i, name in ipairs(error_names) do
   field("status_error_" .. name, ProtoField.bool, "status.errors." .. name, name, 16, nil, math.floor(2 ^ (i - 1)))
 end

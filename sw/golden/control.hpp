@@ -36,6 +36,7 @@ enum ErrorBit : uint8_t {
   kErrorWindow = 1 << 4,   // a sample inside both images is not loaded
   kErrorAddress = 1 << 5,  // unknown register, or a table word out of order or range
   kErrorBusy = 1 << 6,     // write or start while a tile is in work
+  kErrorUpset = 1 << 7,    // RTL alone: a state or an end of the map that cannot be; the tile is dropped
 };
 
 // Clocks from the first input to the first output of an entity.

@@ -74,9 +74,9 @@ inline uint64_t pack_cell(const Config& c, const MapCell& cell) {
 
 // "config, short" and so on; "none" for 0.
 inline std::string error_names(unsigned bits) {
-  static const char* const names[] = {"config", "table", "short", "long", "window", "address", "busy"};
+  static const char* const names[] = {"config", "table", "short", "long", "window", "address", "busy", "upset"};
   std::string text;
-  for (unsigned i = 0; i < 7; ++i)
+  for (unsigned i = 0; i < 8; ++i)
     if (bits >> i & 1) text += (text.empty() ? "" : ", ") + std::string(names[i]);
   return text.empty() ? "none" : text;
 }

@@ -291,8 +291,8 @@ inline Message status_reply(const net::Header& h, const net::Status& s, const La
   m.u16("status.table_words", s.table_words);
   m.u32("status.cells", s.cells);
   m.u16("status.errors", s.errors);
-  static const char* const errors[] = {"config", "table", "short", "long", "window", "address", "busy"};
-  for (int i = 0; i < 7; ++i) m.bits(std::string("status.errors.") + errors[i], s.errors >> i & 1);
+  static const char* const errors[] = {"config", "table", "short", "long", "window", "address", "busy", "upset"};
+  for (int i = 0; i < 8; ++i) m.bits(std::string("status.errors.") + errors[i], s.errors >> i & 1);
   m.u16("status.error_count", s.error_count);
   m.u16("status.tiles_done", s.tiles_done);
   m.u16("status.tiles_dropped", s.tiles_dropped);
