@@ -338,8 +338,8 @@ void add_alone(Trace& trace, const Message& m, const net::Address& chip, const B
 }
 void tell_layout(Trace& trace, std::vector<Message>& all, Random& random, const net::ArbiterConfig& a,
                  const net::Address& chip) {
-  all.push_back(info_reply(random_header(random, net::kInfo | net::kReply, net::kOk), a, {}, net::kCounterWords,
-                           {0, 0, 0, 0, 0}));
+  all.push_back(
+      info_reply(random_header(random, net::kInfo | net::kReply, net::kOk), a, {}, net::kCounterWords, {0, 0, 0, 0}));
   trace.add(chip, host_port(65000), all.back().bytes);
 }
 
@@ -674,7 +674,7 @@ TEST_CASE("dissector: an INFO reply helps packets before it in two passes, those
   h.type = net::kMap;
   const Message map = map_packet(h, random_cells(random, a.engine, 5), a, -1);
   h.type = net::kInfo | net::kReply;
-  const Message info = info_reply(h, a, {}, net::kCounterWords, {0, 0, 0, 0, 0});
+  const Message info = info_reply(h, a, {}, net::kCounterWords, {0, 0, 0, 0});
   Trace trace;
   trace.add(kChip, host_port(40000), map.bytes);
   trace.add(chip_at(kChip.ip + 1), host_port(40000), map.bytes);
@@ -879,7 +879,7 @@ Message rebuilt(const Bytes& b, bool request, const Layout& layout, int threshol
     REQUIRE(c);
     net::Mac mac;
     for (size_t i = 0; i < 6; ++i) mac[i] = static_cast<uint8_t>(c->mac >> (40 - 8 * i));
-    return info_reply(h, c->config, mac, static_cast<uint32_t>(c->counters), {0, 0, 0, 0, 0});
+    return info_reply(h, c->config, mac, static_cast<uint32_t>(c->counters), {0, 0, 0, 0});
   }
   if (h.type == (net::kCounters | net::kReply) && h.flags == net::kOk) return counters_reply(h, words);
   const auto s = net::parse_status(words);
