@@ -407,4 +407,56 @@ begin
   m_usable_y     <= out_inside_y and out_loaded_y;
   m_window_error <= out_valid and out_inside_x and out_inside_y and not (out_loaded_x and out_loaded_y);
 
+  -- synthesis translate_off
+  -- Rules, in simulators.
+  p_rules : process (clk)
+    variable v_gap   : natural := C_ROW_MIN; -- clocks since the strobe of a row, at most C_ROW_MIN
+    variable v_plane : std_logic_vector(s_plane'range);
+    variable v_first : std_logic;
+    -- What m_* show.
+    variable v_xi_left  : unsigned(C_INT_W - 1 downto 0);
+    variable v_xi_right : unsigned(C_INT_W - 1 downto 0);
+    variable v_yi_left  : unsigned(C_INT_W - 1 downto 0);
+    variable v_yi_right : unsigned(C_INT_W - 1 downto 0);
+  begin
+    if rising_edge(clk) then
+      if s_row_first = '1' then
+        assert s_valid = '1' and v_gap >= C_ROW_MIN
+          report "address_generator: a row without a sample, or too close to the one before"
+          severity failure;
+        v_gap   := 0;
+        v_plane := s_plane;
+        v_first := s_plane_first;
+      end if;
+      if v_gap < C_ROW_MIN then
+        v_gap := v_gap + 1;
+      end if;
+      if v_gap < C_ROW_MIN and rst = '0' then
+        assert s_plane = v_plane and s_plane_first = v_first
+          report "address_generator: the plane changed within a row"
+          severity failure;
+      end if;
+      assert (table_we = '0' and offset_we = '0') or (s_valid = '0' and row(8 downto 1) = "00000000") or rst /= '0'
+        report "address_generator: the table is written while a row is read from it"
+        severity failure;
+      if out_valid = '1' then
+        assert not is_x(std_logic_vector(v_xi_left & v_xi_right & v_yi_left & v_yi_right))
+          report "address_generator: a position is unknown: its table words or offsets were never written"
+          severity failure;
+        assert (out_inside_x and out_loaded_x and out_inside_y and out_loaded_y) /= '1'
+               or (v_xi_left < unsigned(win_last_col) and v_xi_right < unsigned(win_last_col)
+                   and v_yi_left < unsigned(win_last_row) and v_yi_right < unsigned(win_last_row))
+          report "address_generator: a usable sample lies outside the window"
+          severity failure;
+      end if;
+      v_xi_left  := unsigned(floor_of(x_left));
+      v_xi_right := unsigned(floor_of(x_right));
+      if row(8) = '1' then
+        v_yi_left  := unsigned(floor_of(y_older));
+        v_yi_right := unsigned(floor_of(y_newer));
+      end if;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;

@@ -658,4 +658,36 @@ begin
   window_errors <= std_logic_vector(window_errors_q);
   tile_clocks   <= std_logic_vector(tile_clocks_q);
 
+  -- synthesis translate_off
+  -- Rules, in simulators.
+  p_rules : process (clk)
+    variable v_waits : boolean := false; -- a pixel was there and not taken
+    variable v_last  : std_logic;
+    variable v_abort : boolean := false; -- since the latest pixel: a sender may forget its tile then
+  begin
+    if rising_edge(clk) then
+      if rst = '0' then
+        assert event_upset = '0'
+          report "control: a state that cannot be"
+          severity failure;
+        assert not is_x(error_bits) and not is_x(std_logic_vector(error_count_q)) and not is_x(state_q)
+          report "control: an unknown state, error bit or counter"
+          severity failure;
+        assert not v_waits or (s_pix_tvalid = '1' and s_pix_tlast = v_last)
+          report "control: a pixel that waited at s_pix_* was withdrawn or changed"
+          severity failure;
+        assert is_load = '0' or (col <= win_last_col_q and row <= win_last_row_q)
+          report "control: a pixel beyond the window"
+          severity failure;
+        assert is_sweep = '0' or (col <= row_last_col and row <= sweep_last_row and plane_set < C_SETS)
+          report "control: a sample beyond the tile"
+          severity failure;
+      end if;
+      v_abort := command_abort = '1' or (v_abort and (s_pix_tvalid and pix_ready) = '0');
+      v_waits := rst = '0' and s_pix_tvalid = '1' and pix_ready = '0' and not v_abort;
+      v_last  := s_pix_tlast;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;

@@ -185,6 +185,17 @@ begin
     -- The sum lies between two pixels, so it is not negative and below 2^C_ROW_W.
     s2_upper <= s2_upper_start + s2_upper_product;
 
+    -- synthesis translate_off
+    p_rules_upper : process (clk)
+    begin
+      if rising_edge(clk) then
+        assert valid(2) /= '1' or usable_x(2) = '0' or usable_y(2) = '0' or s2_upper >= 0
+          report "interpolation: the upper row's sum is out of range"
+          severity failure;
+      end if;
+    end process p_rules_upper;
+    -- synthesis translate_on
+
     g_rows : if G_RECTIFIED = 0 generate
       signal fy  : std_logic_vector(G_WEIGHT_W - 1 downto 0);
       signal p01 : std_logic_vector(G_PIX_W - 1 downto 0);
@@ -237,6 +248,20 @@ begin
           end if;
         end if;
       end process p_pipe;
+
+      -- synthesis translate_off
+      p_rules : process (clk)
+      begin
+        if rising_edge(clk) then
+          assert valid(3) /= '1' or usable_x(3) = '0' or usable_y(3) = '0' or s3_lower >= 0
+            report "interpolation: the lower row's sum is out of range"
+            severity failure;
+          assert valid(5) /= '1' or usable_x(5) = '0' or usable_y(5) = '0' or s5_start + s5_product >= 0
+            report "interpolation: the sum between the rows is out of range"
+            severity failure;
+        end if;
+      end process p_rules;
+      -- synthesis translate_on
 
     end generate g_rows;
 

@@ -70,4 +70,15 @@ begin
     end if;
   end process p_memory;
 
+  -- synthesis translate_off
+  p_rules : process (clk)
+  begin
+    if rising_edge(clk) then
+      assert a_we /= 'X' and (a_we /= '1' or not is_x(a_addr))
+        report "ram_2r: a write with an unknown enable or address"
+        severity failure;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;

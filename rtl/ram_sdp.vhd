@@ -82,4 +82,15 @@ begin
 
   end generate g_output_register;
 
+  -- synthesis translate_off
+  p_rules : process (clk)
+  begin
+    if rising_edge(clk) then
+      assert we /= 'X' and (we /= '1' or not is_x(waddr))
+        report "ram_sdp: a write with an unknown enable or address"
+        severity failure;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;

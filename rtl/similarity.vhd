@@ -684,4 +684,48 @@ begin
 
   m_valid <= div_valid(G_MNCC_W);
 
+  -- synthesis translate_off
+  -- Rules, in simulators.
+  p_rules : process (clk)
+    variable v_gap : natural := C_ROW_MIN; -- clocks since the strobe of a row, at most C_ROW_MIN
+  begin
+    if rising_edge(clk) then
+      if s_valid = '1' and s_row_first = '1' then
+        assert v_gap >= C_ROW_MIN
+          report "similarity: a row too close to the one before"
+          severity failure;
+        v_gap := 0;
+      end if;
+      if v_gap < C_ROW_MIN then
+        v_gap := v_gap + 1;
+      end if;
+      assert s2_valid /= '1' or s2_warm = '0' or not is_x(s2_old)
+        report "similarity: the sample M rows above is unknown: never written, or read in the clock of its write"
+        severity failure;
+      assert s4_valid /= '1' or s4_first = '1' or not is_x(s4_column)
+        report "similarity: the sums of a column are unknown: never written, or read in the clock of their write"
+        severity failure;
+      if s8_valid = '1' and s8_cell = '1' then
+        assert s8_sp >= 0 and s8_sp <= C_N * (2 ** C_P_W - 2)
+          report "similarity: the sum of p is out of range"
+          severity failure;
+        assert s8_sq >= -C_N * (2 ** G_SAMPLE_W - 1) and s8_sq <= C_N * (2 ** G_SAMPLE_W - 1)
+          report "similarity: the sum of q is out of range"
+          severity failure;
+      end if;
+      if s11_valid = '1' then
+        -- Sums are kept modulo their width: a carry here would be one that is lost.
+        assert ('0' & s11_a) + ('0' & s11_b) = '0' & (s11_a + s11_b)
+          report "similarity: A + B overflows"
+          severity failure;
+      end if;
+      if s15_valid = '1' then
+        assert s15_num <= s15_den and (s15_den = 0 or s15_den(C_NORM - 1) = '1')
+          report "similarity: the quotient's operands are not normalised, or A - B > A + B"
+          severity failure;
+      end if;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;

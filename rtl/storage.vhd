@@ -457,6 +457,28 @@ begin
       end if;
     end process p_sideband;
 
+    -- synthesis translate_off
+    -- Rules, in simulators. Where memories start unknown (the replay bench), a pixel that was never loaded shows.
+    p_rules : process (clk)
+    begin
+      if rising_edge(clk) then
+        assert load_valid /= '1' or s_valid(n) /= '1'
+          report "storage: a pixel is written while samples are read"
+          severity failure;
+        if valid(4) = '1' and usable_x(4) = '1' and usable_y(4) = '1' then
+          for k in 0 to 1 loop
+            assert not is_x(s4_p00((k * G_LANES + n + 1) * G_PIX_W - 1 downto (k * G_LANES + n) * G_PIX_W))
+                   and not is_x(s4_p10((k * G_LANES + n + 1) * G_PIX_W - 1 downto (k * G_LANES + n) * G_PIX_W))
+                   and not is_x(s4_p01((k * G_LANES + n + 1) * G_PIX_W - 1 downto (k * G_LANES + n) * G_PIX_W))
+                   and not is_x(s4_p11((k * G_LANES + n + 1) * G_PIX_W - 1 downto (k * G_LANES + n) * G_PIX_W))
+              report "storage: a pixel of a usable sample was never loaded"
+              severity failure;
+          end loop;
+        end if;
+      end if;
+    end process p_rules;
+    -- synthesis translate_on
+
   end generate g_sideband;
 
 end architecture rtl;

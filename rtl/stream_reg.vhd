@@ -68,4 +68,32 @@ begin
     end if;
   end process p_buffer;
 
+  -- synthesis translate_off
+  -- Rules of a stream, in simulators: a beat that was not taken is still there, on both sides.
+  p_rules : process (clk)
+    variable v_s_waits : boolean := false;
+    variable v_m_waits : boolean := false;
+    variable v_s_data  : std_logic_vector(G_DATA_W - 1 downto 0);
+    variable v_m_data  : std_logic_vector(G_DATA_W - 1 downto 0);
+  begin
+    if rising_edge(clk) then
+      if rst = '0' then
+        assert not v_s_waits or (s_tvalid = '1' and s_tdata = v_s_data)
+          report "stream_reg: a beat that waited at s_* was withdrawn or changed"
+          severity failure;
+        assert not v_m_waits or (m_stall /= 'U' and main_valid = '1' and main_data = v_m_data)
+          report "stream_reg: a beat that waited at m_* was withdrawn or changed"
+          severity failure;
+        assert skid_valid = '0' or main_valid = '1'
+          report "stream_reg: a parked beat behind an empty place"
+          severity failure;
+      end if;
+      v_s_waits := rst = '0' and s_tvalid = '1' and skid_valid = '1';
+      v_m_waits := rst = '0' and main_valid = '1' and m_tready = '0';
+      v_s_data  := s_tdata;
+      v_m_data  := main_data;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;

@@ -526,4 +526,42 @@ begin
   unload_more <= unloading or fetched;
   unload_done <= beat_valid and m_tready and beat(C_DATA_W);
 
+  -- synthesis translate_off
+  -- Rules, in simulators.
+  p_rules : process (clk)
+    variable v_way : std_logic; -- a cell is on its way to the map
+  begin
+    if rising_edge(clk) then
+      v_way := s_valid(0) or s1_valid;
+      for n in 0 to G_LANES loop
+        v_way := v_way or way_in_valid(n);
+      end loop;
+      for n in 0 to G_FRAC_W loop
+        v_way := v_way or way_valid(n);
+      end loop;
+      assert unload /= '1' or v_way = '0'
+        report "updating: unloading begins while cells are on their way to the map"
+        severity failure;
+      assert s_valid(0) /= '1' or (unloading or fetched) = '0'
+        report "updating: a cell comes while the map is unloaded"
+        severity failure;
+      assert s1_valid /= '1' or s1_first = '1' or not is_x(word)
+        report "updating: a cell of the map is unknown: never written, or read in the clock of its write"
+        severity failure;
+      assert fetched /= '1' or not is_x(word)
+        report "updating: a cell that leaves is unknown"
+        severity failure;
+      assert way_valid(G_FRAC_W) /= '1' or to_integer(write_cell) < G_CELLS
+        report "updating: more cells than the map has"
+        severity failure;
+      if way_in_valid(G_LANES) = '1' and way_parabola(G_LANES) = '1' then
+        assert unsigned(s3_num) <= unsigned(way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1)))
+               and unsigned(way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1))) /= 0
+          report "updating: the parabola's quotient is not in 0..1"
+          severity failure;
+      end if;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
+
 end architecture rtl;
