@@ -38,10 +38,10 @@ build_and_prove() {
     check_crossings "$folder" "$@"
     return
   fi
-  local dir=$1 top=$2 generics=$3 exposed=$4 name synchroniser='' signals='' signal
+  local dir=$1 top=$2 generics=$3 exposed=$4 name synchroniser='' signals='' signal defines
   shift 4
   name=${dir##*/}
-  name=${name%%.*}
+  name=${name%%[.-]*} # behind a '-': the same properties with other generics
   # shellcheck disable=SC2086
   {
     ghdl -a --std=93c --workdir="$dir" "$@" &&
@@ -51,6 +51,7 @@ build_and_prove() {
   if grep -qE 'posedge|negedge' "$dir/steps.v"; then echo "an edge in $dir/raw.v was not understood"; return; fi
   # A synchroniser of ideal flip-flops would prove too much.
   synchroniser=$(sed -nE 's/^module (cdc_sync_\w+).*/\1/p' "$dir/steps.v")
+  defines=${generics//-gG_/-D}
   for signal in $exposed; do signals+=" $top/w:$signal"; done
   {
     echo "read_verilog -formal -sv $dir/steps.v"
@@ -60,7 +61,7 @@ build_and_prove() {
       echo "rename cdc_sync_model $synchroniser"
     fi
     if [ -n "$signals" ]; then echo "expose$signals"; fi
-    echo "read_verilog -formal -sv tb/formal/$name.sv"
+    echo "read_verilog -formal -sv $defines tb/formal/$name.sv"
     echo "prep -top proof -flatten"
     echo "opt -full"
     echo "setundef -init -zero"
@@ -148,6 +149,22 @@ proof stream_reg stream_reg '-gG_DATA_W=3' '' 'rtl/psweep_pkg.vhd rtl/stream_reg
 proof crc_step crc_step '' '' 'rtl/eth_pkg.vhd tb/formal/crc_step.vhd' \
   rtl/eth_pkg.vhd 'one coefficient missing' 's/EDB88320/EDB88300/' \
   rtl/eth_pkg.vhd 'residue of the other bit order' 's/DEBB20E3/C704DD7B/'
+
+for lanes in 1 2; do
+  name=control
+  if [ $lanes -gt 1 ]; then name=control-$lanes; fi
+  proof $name control "-gG_IMG_COLS=6 -gG_IMG_ROWS=4 -gG_PLANE_COLS=2 -gG_PLANE_ROWS=2 -gG_PLANES=3 -gG_WINDOW=3 \
+-gG_MNCC_W=4 -gG_LANES=$lanes -gG_LATENCY=5" \
+    'tile_done tile_drop' 'rtl/psweep_pkg.vhd rtl/control.vhd' \
+    rtl/control.vhd 'start with a table too short' 's/and not config_bad and not table_bad;/and not config_bad;/' \
+    rtl/control.vhd 'a tile too wide allowed' 's/cfg_value <= G_PLANE_COLS\)/cfg_value <= G_PLANE_COLS + 1)/' \
+    rtl/control.vhd 'a set too many' 's/plane_set >= last_set or/plane_set > last_set or/' \
+    rtl/control.vhd 'a short row' 's/to_unsigned\(C_ROW_MIN - 1, C_COL_W\)/to_unsigned(C_ROW_MIN - 2, C_COL_W)/' \
+    rtl/control.vhd 'long packet not drained' "/elsif event_long = '1' then/{n;s/C_DRAIN/C_IDLE/}" \
+    rtl/control.vhd 'map unloaded too early' 's/C_FLUSH +: integer := G_LATENCY \+ 1/C_FLUSH : integer := G_LATENCY - 1/' \
+    rtl/control.vhd 'done and dropped' 's/ and not tile_done and not event_short$/ and not event_short/' \
+    rtl/control.vhd 'samples after an abort' "s/active +<= '0';\$/active <= active;/"
+done
 
 # check_crossings DIR FILE..: 'proved' or 'found' (a rule of tb/formal/crossings.ys is broken) or what went wrong.
 check_crossings() {
