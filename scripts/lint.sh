@@ -13,6 +13,7 @@
 #   vhdl       no construct that the conversion to Verilog breaks (lint_text.pl)
 #   units      every entity has a golden model, a test and a page
 #   tables     generics and ports in docs/<entity>.md are those of the entity (lint_tables.pl)
+#   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
 #              (scripts/cmake/ghdl_netlist.vlt)
 #   format     clang-format 14 leaves the C++ as it is
@@ -75,6 +76,7 @@ check_tables() {
   mapfile -t units < <(printf '%s\n' "${vhdl_files[@]}" | grep -v '_pkg\.vhd$')
   scripts/lint_tables.pl "${units[@]}"
 }
+check_trace() { scripts/lint_trace.pl; }
 
 # Keys of a configuration and the generics they become, as in tb/rtl/CMakeLists.txt and tb/chip/CMakeLists.txt.
 engine_keys=(img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES
@@ -142,7 +144,7 @@ check_shell() {
   shellcheck --severity=warning "${scripts[@]}"
 }
 
-checks=(layout text links files analyse vhdl units tables verilog format shell)
+checks=(layout text links files analyse vhdl units tables trace verilog format shell)
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
   --format)
