@@ -111,7 +111,7 @@ mac-opinion: ## The MAC against the MII models of cocotbext-eth in Icarus (fetch
 	@scripts/mac_opinion.sh
 
 .PHONY: mutants
-mutants: setup ## Small faults in a copy of the RTL, one at a time: the tests have to find them   E=<entities> SEED=n COUNT=n
+mutants: setup ## Small faults in a copy of the RTL, one at a time: the tests find them   E=<entities> SEED=n COUNT=n
 	@scripts/mutants.sh $(if $(SEED),--seed $(SEED)) $(if $(COUNT),--count $(COUNT)) $(E)
 
 .PHONY: coverage

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian packages of scripts/packages.txt that are missing, and nothing else.
 #
-#   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion, net, wire, waves
+#   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion,
+#                                                     net, wire, waves
 #     --check  install nothing, name what is missing (exit code 1 if anything is)
 #     --list   print the package names
 #
