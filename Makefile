@@ -49,6 +49,10 @@ sim-net: setup ## The simulated chip behind the kernel's network stack: ping, a 
 sim-ghdl: build ## More recorded streams on the original VHDL in GHDL: every configuration, more tiles   SEEDS='2 3'
 	@scripts/sim_ghdl.sh
 
+.PHONY: rules
+rules: build ## The assertions in the VHDL speak when they should: a fault each, in GHDL (10 s)
+	@scripts/rules.sh
+
 .PHONY: sim-gates
 sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recorded streams; broken cells are noticed
 	@scripts/setup.sh gates
