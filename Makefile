@@ -72,7 +72,7 @@ config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=
 
 .PHONY: bench
 bench: setup ## Speed of the float reference, the bit-true model and the simulated RTL on this machine
-	@scripts/build.sh psweep psweep_bench
+	@scripts/build.sh psweep psweep_bench one_tile
 	@scripts/bench.sh
 
 .PHONY: waves
