@@ -7,12 +7,12 @@
 #
 #   layout     what lies at the top level; a README in each folder
 #   text       ASCII, LF, no tabs, no trailing blanks, 120 columns, SPDX line (lint_text.pl)
-#   links      relative links in Markdown lead somewhere
+#   links      relative links in Markdown lead somewhere; docs/README.md lists all pages
 #   files      rtl/files.f lists every VHDL file once
 #   analyse    GHDL takes all files of rtl/files.f as VHDL-93, warnings are errors
 #   vhdl       no construct that the conversion to Verilog breaks (lint_text.pl)
 #   units      every entity has a golden model, a test and a page
-#   tables     generics and ports in docs/<entity>.md are those of the entity (lint_tables.pl)
+#   tables     docs/<entity>.md: contract, diagram; generics and ports are those of the entity (lint_tables.pl)
 #   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
 #              (scripts/cmake/ghdl_netlist.vlt)

@@ -1,6 +1,6 @@
 #!/usr/bin/env perl
 # SPDX-License-Identifier: Apache-2.0
-# The tables of generics and ports in docs/<entity>.md against the entities of the VHDL.
+# The pages docs/<entity>.md: contract, diagram; tables of generics and ports against the entities of the VHDL.
 #
 #   scripts/lint_tables.pl [--docs DIR] FILE.vhd ...
 #   scripts/lint_tables.pl --rows FILE.vhd ...   what the tables have to say, meanings left blank
@@ -10,6 +10,8 @@
 # assertion states: 'a .. b', 'a .. b, even', 'a, b', 'from a', or the condition itself. A generic that the entity hands
 # down as it is has the range of the entity that checks it; 'any' if nobody does. Each port has a row with its
 # direction and width; ports alike may share a row, separated by commas. Nothing else may be in these tables.
+# '## Contract' is a table with the rows rate, latency, formats, reset and corner cases; '## Diagram' a block of text or
+# a picture.
 use strict;
 use warnings;
 
@@ -117,9 +119,13 @@ for my $entity (@order) {
     my $page = "$docs/$entity.md";
     my $in;
     if (!open $in, '<', $page) { complain("$page: missing, the page of $unit->{file}"); next }
-    my (%generic, %port, $table);
+    my (%generic, %port, $table, %contract, $drawn);
+    my $section = '';
     while (my $line = <$in>) {
         chomp $line;
+        $section = $1 if $line =~ /^## (.*)/;
+        $contract{$1} = 1 if $section eq 'Contract' && $line =~ /^\| ([a-z ]+) \| .*\S.* \|$/;
+        $drawn = 1 if $section eq 'Diagram' && $line =~ /^(```text|!\[)/;
         if ($line !~ /^\|/) { $table = undef; next }
         my @cells = map { squeeze($_) } split /(?<!\\)\|/, $line, -1;
         shift @cells; pop @cells;
@@ -137,6 +143,9 @@ for my $entity (@order) {
             $known->{$name} = [$., $cells[1], $cells[2]];
         }
     }
+    $contract{$_} or complain("$page: no row '$_' in ## Contract")
+        for 'rate', 'latency', 'formats', 'reset', 'corner cases';
+    complain("$page: nothing drawn in ## Diagram") unless $drawn;
     for (@{$unit->{generics}}) {
         my ($name, $default) = @$_;
         my $row = delete $generic{$name};

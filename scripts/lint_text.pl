@@ -5,7 +5,7 @@
 #   scripts/lint_text.pl text FILE ...    ASCII, LF, final newline, tabs, trailing blanks, 120 columns, SPDX
 #   scripts/lint_text.pl vhdl FILE ...    constructs that GHDL 2.0 turns into wrong Verilog, or that are not VHDL-93
 #   scripts/lint_text.pl units FILE ...   every entity has a golden model, a test and a page
-#   scripts/lint_text.pl links FILE ...   relative links of the Markdown files lead to files
+#   scripts/lint_text.pl links FILE ...   relative links of the Markdown files lead to files; docs/README.md lists all
 #
 # Exceptions, each with its reason, are in scripts/lint_waivers.txt; one that matches nothing is an error, too.
 use strict;
@@ -166,6 +166,13 @@ sub check_links {
             $target =~ s/#.*//;
             finding($file, $number, 'link', "$target does not exist", $line) unless -e "$folder$target";
         }
+    }
+    # The index of the pages names all of them.
+    return unless $file eq 'docs/README.md';
+    my $index = slurp($file);
+    for my $page (glob 'docs/*.md') {
+        my ($name) = $page =~ m{([^/]+)$};
+        finding($file, 1, 'index', "$name is not listed") if $name ne 'README.md' && index($index, "]($name)") < 0;
     }
 }
 
