@@ -6,8 +6,8 @@
 #
 # Rows of the tables '| requirement | source | implemented in | shown by |'. Implemented in: files or folders in
 # backticks. Shown by, in backticks: `make TARGET ..`, `lint CHECK`, `test_x` (tb/**/test_x.cpp), `test_x "regex"`
-# (names of its TEST_CASEs) or `ctest "regex"` (names given to add_test); at least one. Every tb/**/test_*.cpp has to be
-# referenced.
+# (names of its TEST_CASEs) or `ctest "regex"` (names given to add_test or rtl_must_not_elaborate); at least one. Every
+# tb/**/test_*.cpp has to be referenced.
 use strict;
 use warnings;
 use File::Find;
@@ -41,7 +41,7 @@ find(sub {
     if (/^CMakeLists\.txt$|\.cmake$/) {
         my $text = slurp($_);
         # Variables in a name stand for anything.
-        while ($text =~ /add_test\(\s*NAME\s+"([^"]+)"/g) { push @ctests, $1 }
+        while ($text =~ /(?:add_test\(\s*NAME|rtl_must_not_elaborate\()\s*"([^"]+)"/g) { push @ctests, $1 }
     }
 }, 'tb');
 my %target = map { $_ => 1 } slurp('Makefile') =~ /^([a-z][a-z-]*):/mg;
