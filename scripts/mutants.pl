@@ -14,7 +14,7 @@ use POSIX ":sys_wait_h";
 my $root = getcwd();
 my $dir  = "$root/build/mutants";
 my $list_file = 'scripts/mutants_equivalent.txt';
-my ($count, $seed, $only, $list, $strict, @wanted) = (120, 1, '', 0, 0);
+my ($count, $seed, $only, $list, $strict, @wanted) = (100, 1, '', 0, 0);
 while (@ARGV) {
   my $arg = shift @ARGV;
   if    ($arg eq '--count')  { $count = shift @ARGV }
@@ -56,11 +56,21 @@ die "mutants: rtl/files.f names no file\n" unless @entities;
 for my $name (@wanted) { die "mutants: no entity $name in rtl/files.f\n" unless $chain{$name} }
 @wanted = @entities unless @wanted;
 
-sub lines_of { my ($file) = @_; open my $in, '<', $file or die "$file: $!\n"; my @l = <$in>; close $in; chomp @l; return @l }
+sub lines_of {
+  my ($file) = @_;
+  open my $in, '<', $file or die "$file: $!\n";
+  my @l = <$in>;
+  close $in;
+  chomp @l;
+  return @l;
+}
 
 # The candidates of a file -----------------------------------------------------------------------------------------
 # Left alone: declarations of entities (defaults of generics, ports), of signals and types, assertions (illegal generics
 # have tests of their own) and what is not synthesised.
+my $declaration = qr/^\s*(signal|type|subtype|attribute|port|use|library|function|procedure|architecture|package|end
+                            |shared|variable)\b/xi;
+my $token = qr/x?"[^"]*"|'[01XZ-]'|\d+\#\w+\#|[a-zA-Z]\w*'\w+|[a-zA-Z]\w*|\d+|<=|>=|\/=|=>|:=|\*\*|./;
 sub candidates {
   my ($name) = @_;
   my @found;
@@ -76,7 +86,7 @@ sub candidates {
     if ($skip) { $skip = '' if $code =~ /$skip/i; next }
     if ($code =~ /^\s*entity\s+\w+\s+is/i)     { $skip = '^\s*end\s+entity'; next }
     if ($code =~ /^\s*assert\b/i)              { $skip = ';\s*$' unless $code =~ /;\s*$/; next }
-    if ($code =~ /^\s*(signal|type|subtype|attribute|port|use|library|function|procedure|architecture|package|end|shared|variable)\b/i) {
+    if ($code =~ $declaration) {
       $process = 0 if $code =~ /^\s*end\s+(process|function)/i;
       $process = 1 if $code =~ /^\s*function\b/i && $code =~ /\bis\b/;
       next if $code !~ /^\s*(function|procedure)\b/i && ($code =~ /;\s*$/ || $code =~ /\b(is|port)\b/i);
@@ -93,7 +103,7 @@ sub candidates {
     };
     # Tokens.
     my @t;
-    while ($code =~ /\G(?:(\s+)|(x?"[^"]*"|'[01XZ-]'|\d+#\w+#|[a-zA-Z]\w*'\w+|[a-zA-Z]\w*|\d+|<=|>=|\/=|=>|:=|\*\*|.))/gc) {
+    while ($code =~ /\G(?:(\s+)|($token))/gc) {
       push @t, {s => $2, at => $-[2]} if defined $2;
     }
     my $replace = sub {
@@ -111,7 +121,10 @@ sub candidates {
       $depth++ if $s eq '(';
       $depth-- if $s eq ')';
       if ($low =~ /^(if|elsif|when|while|return)$/) { $condition = 1 }
-      elsif ($s eq ';' || $low =~ /^(then|loop|generate|begin)$/) { $condition = $assigned = 0; $depth = 0 if $s eq ';' }
+      elsif ($s eq ';' || $low =~ /^(then|loop|generate|begin)$/) {
+        $condition = $assigned = 0;
+        $depth = 0 if $s eq ';';
+      }
       elsif ($low eq 'else') { $condition = 0 }
       if ($is_clock) { next }
       if ($s eq '=')     { $add->('compare', $replace->($i, '/=')) }
@@ -124,7 +137,8 @@ sub candidates {
         $assigned = 1;
       }
       elsif ($s eq ':=') { $assigned = 1 }
-      elsif (($s eq '+' || $s eq '-') && $previous =~ /^(\w+|\)|\w+'\w+)$/ && !($t[$i + 2] && $t[$i + 2]{s} =~ /^(downto|to)$/i)) {
+      elsif (($s eq '+' || $s eq '-') && $previous =~ /^(\w+|\)|\w+'\w+)$/
+             && !($t[$i + 2] && $t[$i + 2]{s} =~ /^(downto|to)$/i)) {
         $add->('arithmetic', $replace->($i, $s eq '+' ? '-' : '+'));
       }
       elsif ($low eq 'and') { $add->('logic', $replace->($i, 'or')) }
@@ -285,26 +299,35 @@ $ENV{CCACHE_NOHASHDIR} = 1;
 $ENV{PSWEEP_SEED} = 1 unless defined $ENV{PSWEEP_SEED};
 $| = 1;
 
-sub slurp { my ($f) = @_; open my $in, '<:raw', $f or die "$f: $!\n"; local $/; my $t = <$in>; close $in; return $t // '' }
+sub slurp {
+  my ($f) = @_;
+  open my $in, '<:raw', $f or die "$f: $!\n";
+  local $/;
+  my $t = <$in>;
+  close $in;
+  return $t // '';
+}
 sub spew  { my ($f, $t) = @_; open my $out, '>:raw', $f or die "$f: $!\n"; print $out $t; close $out or die "$f: $!\n" }
 
 # Brings a copy up to date; files that are the same keep their times. Returns a hash of all of it.
 sub synchronise {
-  my ($tree) = @_;
+  my ($from, $tree) = @_;
   my (%wanted_file, @hashes);
   my $take = sub {
     return unless -f $_;
     (my $file = $File::Find::name) =~ s{^\./}{};
     return if $file =~ m{^tb/(chip/)?configs/(tile|bands)\.json$};  # large and slow; no test used here needs them
     $wanted_file{$file} = 1;
-    my $content = slurp("$root/$file");
+    my $content = slurp("$from/$file");
     push @hashes, "$file " . md5_hex($content);
     return if -f "$tree/$file" && -s "$tree/$file" == length $content && slurp("$tree/$file") eq $content;
     make_path(dirname("$tree/$file"));
     spew("$tree/$file", $content);
-    chmod((stat "$root/$file")[2] & 07777, "$tree/$file");
+    chmod((stat "$from/$file")[2] & 07777, "$tree/$file");
   };
+  chdir $from or die "$from: $!\n";
   find({wanted => $take, no_chdir => 1}, 'CMakeLists.txt', 'rtl', 'sw', 'tb', 'scripts');
+  chdir $root or die "$root: $!\n";
   find({wanted => sub {
     (my $file = $File::Find::name) =~ s{^\Q$tree\E/}{};
     unlink $File::Find::name if -f $File::Find::name && !$wanted_file{$file};
@@ -346,7 +369,8 @@ sub prepare {
   my $at = "$dir/$job";
   make_path("$at/tree");
   $ENV{CCACHE_BASEDIR} = $at;
-  my $hash = synchronise("$at/tree");
+  # The first copy is what the others are copies of: somebody may go on editing.
+  my $hash = synchronise($job == 1 ? $root : "$dir/1/tree", "$at/tree");
   chdir $at or die "$at: $!\n";
   my ($code) = run("$at/configure.log", 300, 0, 'cmake', '-S', 'tree', '-B', 'build', '-G', 'Ninja',
                    '-DPSWEEP_VERILATOR_EXTRA=-Wno-fatal', '-DPSWEEP_FAST_OPTION=-O1',
@@ -356,30 +380,40 @@ sub prepare {
   return $hash;
 }
 
-# The tests have to pass on the circuit as it is, or to fail would mean nothing. Remembered as long as nothing changes.
+# All copies are made before the first fault is put into one.
 my $hash = prepare(1);
-my %seconds;
-if (-e "$dir/baseline.txt") {
-  my ($old, @lines) = lines_of("$dir/baseline.txt");
-  if ($old eq $hash) { for (@lines) { my ($t, $s) = split /\t/; $seconds{$t} = $s } }
+prepare($_) for 2 .. $jobs;
+for my $name (@entities) {
+  die "mutants: rtl/$name.vhd was changed while it was copied\n"
+    if slurp("$dir/1/tree/rtl/$name.vhd") ne join("\n", @{$text{$name}}) . "\n";
 }
-{
-  my %tests = map { $_ => 1 } map { @{$chain{$_}} } @wanted;
-  my @missing = sort grep { !defined $seconds{$_} } keys %tests;
-  chdir "$dir/1";
-  $ENV{CCACHE_BASEDIR} = "$dir/1";
-  for my $n (0 .. $#missing) {
-    my ($program, $binary, @filter) = test_parts($missing[$n]);
-    printf "mutants: the tests as they are, %d of %d: %s\n", $n + 1, scalar @missing, $missing[$n];
-    my ($code) = run("baseline.log", 3600, 0, 'ninja', '-C', 'build', "-j$jobs", $program);
-    die "mutants: $program cannot be built: $dir/1/baseline.log\n" if $code != 0;
-    ($code, my $took) = run("baseline.log", 1800, 0, $binary, '-a', @filter);
-    die "mutants: $missing[$n] fails on the circuit as it is: $dir/1/baseline.log\n"
-      if $code != 0 || slurp('baseline.log') !~ /All tests passed \([1-9]/;
-    $seconds{$missing[$n]} = $took;
+
+# A test has to pass on the circuit as it is, or to fail would mean nothing. Done when a test is needed for the first
+# time; remembered with its time as long as no file changes.
+my %seconds;
+sub known_baselines {
+  return unless -e "$dir/baseline.txt";
+  my ($old, @lines) = lines_of("$dir/baseline.txt");
+  return unless ($old // '') eq $hash;
+  for (@lines) { my ($t, $s) = split /\t/; $seconds{$t} = $s }
+}
+sub baseline {
+  my ($test) = @_;
+  locked(\&known_baselines);
+  return if defined $seconds{$test};
+  my ($program, $binary, @filter) = test_parts($test);
+  my $log = getcwd() . '/baseline.log';
+  my ($code) = run($log, 3600, 0, 'ninja', '-C', 'build', '-j1', $program);
+  die "mutants: $program cannot be built: $log\n" if $code != 0;
+  ($code, my $took) = run($log, 1800, 0, $binary, '-a', @filter);
+  die "mutants: $test fails on the circuit as it is: $log\n"
+    if $code != 0 || slurp($log) !~ /All tests passed \([1-9]/;
+  printf "mutants: the circuit as it is passes %s (%d s)\n", $test, $took;
+  locked(sub {
+    known_baselines();
+    $seconds{$test} = $took;
     spew("$dir/baseline.txt", join "\n", $hash, (map { "$_\t$seconds{$_}" } sort keys %seconds), '');
-  }
-  chdir $root;
+  });
 }
 
 # The mutants ------------------------------------------------------------------------------------------------------
@@ -420,13 +454,17 @@ sub test_mutant {
   my @lines = @$original;
   $lines[$m->{line}] = $m->{after};
   my $file = "$at/tree/rtl/$m->{entity}.vhd";
-  spew($file, join("\n", @lines) . "\n");
   my $begun = time;
   my $log = "$at/log.$m->{id}.txt";
   my ($verdict, $by) = ('SURVIVED', '-');
   spew($log, shown($m) . "\n");
   for my $test (@{$chain{$m->{entity}}}) {
     my ($program, $binary, @filter) = test_parts($test);
+    if (!defined $seconds{$test}) {
+      spew($file, join("\n", @$original) . "\n");
+      baseline($test);
+    }
+    spew($file, join("\n", @lines) . "\n");
     my ($code) = run($log, 900, 1, 'ninja', '-C', 'build', '-j1', $program);
     if ($code != 0) { $verdict = 'invalid'; last }
     ($code) = run($log, 20 + 3 * $seconds{$test}, 1, $binary, '-a', @filter);
@@ -443,16 +481,16 @@ my @workers;
 for my $job (1 .. $jobs) {
   my $pid = fork // die "fork: $!\n";
   if ($pid) { push @workers, $pid; next }
-  prepare($job) if $job > 1;
   my $at = "$dir/$job";
   $ENV{CCACHE_BASEDIR} = $at;
   chdir $at or die "$at: $!\n";
   while ((my $n = next_task()) < @tasks) {
     my $name = $tasks[$n];
-    my $valid = 0;
+    my ($valid, $invalid) = (0, 0);
     for my $m (@{$order{$name}}) {
       last if $valid == $quota{$name};
-      $valid++ if test_mutant($m, $at, $text{$name}) ne 'invalid';
+      if (test_mutant($m, $at, $text{$name}) ne 'invalid') { $valid++; $invalid = 0; next }
+      die "mutants: $name: nothing can be built any more: $at\n" if ++$invalid == 25;
     }
     spew("$at/tree/rtl/$name.vhd", join("\n", @{$text{$name}}) . "\n");
   }
@@ -476,7 +514,8 @@ for my $line (lines_of("$dir/results.txt")) {
   $table{$name}{$column}++;
   $sum{$column}++;
   push @bad, "survived and is not in $list_file: $shown" if $column eq 'SURVIVED';
-  push @bad, "$equivalent{$key}{where}: not equivalent, $by killed it: $shown" if $equivalent{$key} && $verdict =~ /^killed/;
+  push @bad, "$equivalent{$key}{where}: not equivalent, $by killed it: $shown"
+    if $equivalent{$key} && $verdict =~ /^killed/;
 }
 printf "\n%-20s %8s", 'entity', 'mutants';
 printf " | %s", $_ for @columns;
@@ -501,6 +540,6 @@ push @bad, "$broken jobs broke off" if $broken;
 push @bad, 'nothing was tested' if $tested == 0;
 print "mutants: $_\n" for @bad;
 my $killed = $tested - ($sum{equivalent} // 0) - ($sum{SURVIVED} // 0);
-printf "mutants: %d tested, %d killed, %d equivalent, %d survived, %d could not be built; %s minutes\n", $tested, $killed,
-  $sum{equivalent} // 0, $sum{SURVIVED} // 0, $sum{invalid} // 0, duration(time - $started);
+printf "mutants: %d tested, %d killed, %d equivalent, %d survived, %d could not be built; %s minutes\n",
+  $tested, $killed, $sum{equivalent} // 0, $sum{SURVIVED} // 0, $sum{invalid} // 0, duration(time - $started);
 exit(@bad ? 1 : 0);
