@@ -10,8 +10,8 @@
 # assertion states: 'a .. b', 'a .. b, even', 'a, b', 'from a', or the condition itself. A generic that the entity hands
 # down as it is has the range of the entity that checks it; 'any' if nobody does. Each port has a row with its
 # direction and width; ports alike may share a row, separated by commas. Nothing else may be in these tables.
-# '## Contract' is a table with the rows rate, latency, formats, reset and corner cases; '## Diagram' a block of text or
-# a picture.
+# '## Contract' is a table with the rows rate, latency, formats, reset, corner cases and cost; '## Diagram' a block of
+# text or a picture.
 use strict;
 use warnings;
 
@@ -144,7 +144,7 @@ for my $entity (@order) {
         }
     }
     $contract{$_} or complain("$page: no row '$_' in ## Contract")
-        for 'rate', 'latency', 'formats', 'reset', 'corner cases';
+        for 'rate', 'latency', 'formats', 'reset', 'corner cases', 'cost';
     complain("$page: nothing drawn in ## Diagram") unless $drawn;
     for (@{$unit->{generics}}) {
         my ($name, $default) = @$_;
