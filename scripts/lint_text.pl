@@ -5,7 +5,7 @@
 #   scripts/lint_text.pl text FILE ...    ASCII, LF, final newline, tabs, trailing blanks, 120 columns, SPDX
 #   scripts/lint_text.pl vhdl FILE ...    constructs that GHDL 2.0 turns into wrong Verilog, or that are not VHDL-93
 #   scripts/lint_text.pl units FILE ...   every entity has a golden model, a test and a page
-#   scripts/lint_text.pl links FILE ...   relative links of the Markdown files lead to files; docs/README.md lists all
+#   scripts/lint_text.pl links FILE ...   links of the Markdown files lead to files and headings; docs/README.md has all
 #
 # Exceptions, each with its reason, are in scripts/lint_waivers.txt; one that matches nothing is an error, too.
 use strict;
@@ -151,6 +151,18 @@ sub check_units {
 }
 
 # --- links ---
+# Headings of a page as anchors: small letters, blanks to '-', other marks left out.
+my %headings;
+sub headings {
+    my ($page) = @_;
+    return $headings{$page} //= { map {
+        my $name = lc;
+        $name =~ s/[^a-z0-9 _-]//g;
+        $name =~ s/ /-/g;
+        $name => 1
+    } slurp($page) =~ /^#+ (.*)$/mg };
+}
+
 sub check_links {
     my ($file) = @_;
     my ($folder) = $file =~ m{^(.*/)?[^/]*$};
@@ -162,9 +174,12 @@ sub check_links {
         next if $code;
         while ($line =~ /\]\(([^)\s]+)\)|\bsrc="([^"]+)"/g) {
             my $target = $1 // $2;
-            next if $target =~ m{^(https?:|mailto:|\#)};
-            $target =~ s/#.*//;
-            finding($file, $number, 'link', "$target does not exist", $line) unless -e "$folder$target";
+            next if $target =~ m{^(https?:|mailto:)};
+            my $anchor = $target =~ s/#(.*)// ? $1 : '';
+            my $page = $target eq '' ? $file : "$folder$target";
+            finding($file, $number, 'link', "$target does not exist", $line) unless -e $page;
+            finding($file, $number, 'link', "no heading for #$anchor", $line)
+              if $anchor ne '' && $page =~ /\.md$/ && -e $page && !headings($page)->{$anchor};
         }
     }
     # The index of the pages names all of them.
