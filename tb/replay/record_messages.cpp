@@ -46,7 +46,7 @@ class Host {
   // Sends it and waits for the answer, whose code has to be this one.
   net::Header ask(const net::Bytes& b, net::Code code, const char* what) {
     send(b);
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < 40; ++i) {
       const auto answer = station_.receive_udp(3 * kMillisecond);
       if (!answer) break;
       const auto h = net::decode(*answer);
@@ -146,27 +146,27 @@ void run(const Chip& chip, const std::string& file, const std::vector<std::strin
   job.win_cols = job.win_rows = 4;
   job.planes = 1;
   const auto start = [&] { return net::start_payload(c, job, 1); };
-  host.ask(net::kStart, 1, 0, word(0), net::kBadMessage, "START too short");
+  host.ask(net::kStart, 0, 0, word(0), net::kBadMessage, "START too short");
   host.ask(net::kStart, 7, 0, start(), net::kOrder, "START of a far tile");
   b = start();
   b[1] ^= 2;
-  host.ask(net::kStart, 1, 0, b, net::kOrder, "START with another table");
+  host.ask(net::kStart, 0, 0, b, net::kOrder, "START with another table");
   b = start();
   net::put32(b, 4, 0);
-  host.ask(net::kStart, 1, 0, b, net::kBadMessage, "START without pixels");
+  host.ask(net::kStart, 0, 0, b, net::kBadMessage, "START without pixels");
   job.planes = 3;
-  host.ask(net::kStart, 1, 0, start(), net::kOrder, "START with too many planes");
+  host.ask(net::kStart, 0, 0, start(), net::kOrder, "START with too many planes");
   job.planes = 1;
-  host.ask(net::kStart, 1, 0, start(), net::kOk, "START");
-  host.ask(net::kStart, 2, 0, start(), net::kNotReady, "START behind a tile that waits");
+  host.ask(net::kStart, 0, 0, start(), net::kOk, "START");
+  host.ask(net::kStart, 1, 0, start(), net::kNotReady, "START behind a tile that waits");
   host.ask(net::kTable, 1, 0, word(0), net::kNotReady, "TABLE while a tile waits");
   host.ask(net::kTable, 2, 0, word(0), net::kNotReady, "next TABLE while a tile waits");
 
   const net::Bytes chunk(static_cast<size_t>(c.chunk_pairs()) * static_cast<size_t>(c.pair_bytes()), 0x33);
-  host.ask(net::kWrite, 1, 0, word(0), net::kBadMessage, "WRITE too short", net::kFlagAnswer);
+  host.ask(net::kWrite, 0, 0, word(0), net::kBadMessage, "WRITE too short", net::kFlagAnswer);
   host.ask(net::kWrite, 5, 0, chunk, net::kOrder, "WRITE of another tile", net::kFlagAnswer);
-  host.ask(net::kWrite, 1, 900, chunk, net::kNotReady, "WRITE beyond the tile", net::kFlagAnswer);
-  host.ask(net::kWrite, 1, 0, chunk, net::kOk, "WRITE", net::kFlagAnswer);  // the engine begins, and refuses
+  host.ask(net::kWrite, 0, 900, chunk, net::kNotReady, "WRITE beyond the tile", net::kFlagAnswer);
+  host.ask(net::kWrite, 0, 0, chunk, net::kOk, "WRITE", net::kFlagAnswer);  // the engine begins, and refuses
   host.ask(net::kStatus, 0, 0, {}, net::kOk, "STATUS");
 
   // Two chunks of rows: one twice; a map that is not complete when it shall be released.
@@ -174,13 +174,13 @@ void run(const Chip& chip, const std::string& file, const std::vector<std::strin
   job.tile_rows = 4;
   job.win_cols = c.engine.img_cols;
   job.win_rows = c.engine.img_rows;
-  host.ask(net::kStart, 2, 0, start(), net::kOk, "second START");
-  host.ask(net::kWrite, 2, 0, chunk, net::kOk, "first WRITE", net::kFlagAnswer);
-  host.ask(net::kWrite, 2, 0, chunk, net::kOk, "the same WRITE", net::kFlagAnswer);
+  host.ask(net::kStart, 1, 0, start(), net::kOk, "second START");
+  host.ask(net::kWrite, 1, 0, chunk, net::kOk, "first WRITE", net::kFlagAnswer);
+  host.ask(net::kWrite, 1, 0, chunk, net::kOk, "the same WRITE", net::kFlagAnswer);
   const int chunks = (job.win_cols * job.win_rows + c.chunk_pairs() - 1) / c.chunk_pairs();
-  for (int i = 1; i < chunks; ++i) host.send(host.message(net::kWrite, 2, static_cast<uint16_t>(i), chunk));
+  for (int i = 1; i < chunks; ++i) host.send(host.message(net::kWrite, 1, static_cast<uint16_t>(i), chunk));
   for (int i = 0; i < 12; ++i) {
-    host.send(host.message(net::kRelease, 2, 0, {}));
+    host.send(host.message(net::kRelease, 1, 0, {}));
     desk.run_for(30 * kMicrosecond);
   }
   desk.run_for(2 * kMillisecond);
