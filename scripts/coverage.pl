@@ -2,7 +2,8 @@
 # Merges and reports what scripts/coverage.sh has counted.
 #
 #   coverage.pl lines OUT COUNT.json ..     GHDL's counts: a line is covered if any run has reached it
-#   coverage.pl toggles OUT FILE ..         names of bits, '1' or '0' and a tabulator before each (tb/support/coverage.hpp)
+#   coverage.pl toggles OUT FILE ..         names of bits, '1' or '0' and a tabulator before each
+#                                           (tb/support/coverage.hpp)
 use strict;
 use warnings;
 
@@ -11,7 +12,14 @@ die "coverage: nothing was counted\n" unless defined $out && @files;
 my @order;
 for my $line (lines_of('rtl/files.f')) { push @order, $1 if $line =~ /^(\w+)\.vhd/ }
 
-sub lines_of { my ($f) = @_; open my $in, '<', $f or die "coverage: $f: $!\n"; my @l = <$in>; close $in; chomp @l; return @l }
+sub lines_of {
+  my ($f) = @_;
+  open my $in, '<', $f or die "coverage: $f: $!\n";
+  my @l = <$in>;
+  close $in;
+  chomp @l;
+  return @l;
+}
 sub spew { my ($f, @t) = @_; open my $o, '>', $f or die "coverage: $f: $!\n"; print $o @t; close $o or die "$f: $!\n" }
 sub trimmed { my ($t) = @_; $t =~ s/--.*//; $t =~ s/\s+/ /g; $t =~ s/^ | $//g; return $t }
 
@@ -52,7 +60,11 @@ sub lines {
       $explained{$key} = {where => "$list:$n", reason => ''};
       push @pending, $key;
     }
-    elsif ($line =~ /^  (\S.*)/ && @pending) { $explained{$_}{reason} .= "$1 " for @pending; $last_was_reason = 1; next }
+    elsif ($line =~ /^  (\S.*)/ && @pending) {
+      $explained{$_}{reason} .= "$1 " for @pending;
+      $last_was_reason = 1;
+      next;
+    }
     else { die "coverage: $list:$n: not understood\n" }
     $last_was_reason = 0;
   }
@@ -97,7 +109,8 @@ sub lines {
   spew("$out/lines.txt", "Lines of VHDL that were run\n\n", @table, $sum, "\nHoles\n\n", @holes, "\n");
   print @table, $sum;
   print "coverage: $_\n" for @bad;
-  printf "coverage: %d of %d lines, %.2f %%, %d holes, %d problems\n", $covered, $all, $percent, scalar @holes, scalar @bad;
+  printf "coverage: %d of %d lines, %.2f %%, %d holes, %d problems\n", $covered, $all, $percent, scalar @holes,
+    scalar @bad;
   return @bad ? 1 : 0;
 }
 
@@ -114,7 +127,8 @@ sub toggles {
   my $unknown = 0;
   for my $name (keys %bit) {
     my ($module, $signal) = split / /, $name, 2;
-    my ($entity) = grep { $module eq $_ || $module =~ /^\Q$_\E_(?:[0-9a-f]{8,}|\d)/ } sort { length $b <=> length $a } @order;
+    my ($entity) = grep { $module eq $_ || $module =~ /^\Q$_\E_(?:[0-9a-f]{8,}|\d)/ }
+      sort { length $b <=> length $a } @order;
     if (!$entity) { $unknown++; next }
     $total{$entity}++;
     $hit{$entity} += $bit{$name};
@@ -124,7 +138,8 @@ sub toggles {
   my ($all, $changed, @table, @silent) = (0, 0);
   for my $name (@order) {
     if (!$total{$name}) { push @table, sprintf("%-20s %s\n", $name, 'no signal of its own'); next }
-    push @table, sprintf("%-20s %6d of %6d  %6.2f %%\n", $name, $hit{$name}, $total{$name}, 100 * $hit{$name} / $total{$name});
+    push @table, sprintf("%-20s %6d of %6d  %6.2f %%\n", $name, $hit{$name}, $total{$name},
+      100 * $hit{$name} / $total{$name});
     $all += $total{$name};
     $changed += $hit{$name};
     push @silent, map { "$name.$_\n" } grep { !$never{$name}{$_} } sort keys %{$never{$name}};

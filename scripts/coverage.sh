@@ -40,33 +40,37 @@ if wants lines; then
   if [ -z "$version" ] || [ "$version" -lt 4 ]; then
     say "$("$ghdl" --version | head -n 1): too old to count lines; nothing was measured."
     say "GHDL 4 or newer is needed. Debian 13 has 5.0: run this there, in a container"
-    say "  docker run --rm -v $root:/psweep -w /psweep debian:trixie sh -c 'apt-get update; apt-get install -y make; make coverage'"
-    say "or in a root of debootstrap --variant=minbase trixie (see scripts/fresh_machine.sh); or name a program by GHDL=."
+    say "  docker run --rm -v $root:/psweep -w /psweep debian:trixie \\"
+    say "    sh -c 'apt-get update; apt-get install -y make; make coverage'"
+    say "or in a root of debootstrap --variant=minbase trixie (see scripts/fresh_machine.sh); or name one by GHDL=."
     say "Toggles need no newer one: scripts/coverage.sh toggles"
     exit 2
   fi
 fi
 
-# lines: every recording is replayed on a build that counts.
+# lines: every recording is replayed on a build that counts. (No 'set -e' in functions that are called with '||'.)
+recordings='^replay: .*, record'
 count_lines() {
   if [ "${NO_BUILD:-no}" != yes ]; then
-    scripts/build.sh record_engine record_chip psweep_replay psweep_top_replay
+    scripts/build.sh record_engine record_chip record_messages psweep_replay psweep_top_replay || return 1
     say "recording"
-    (cd "$build" && ctest --parallel "$jobs" --no-tests=error -R '^replay: .*, record' --output-on-failure | tail -n 4)
+    (cd "$build" && ctest -C coverage --parallel "$jobs" --no-tests=error -R "$recordings" --output-on-failure) \
+      > "$out/recording.log" 2>&1 || { tail -n 30 "$out/recording.log"; return 1; }
   fi
   local work=$out/lines bench recording name entity
   rm -rf "$work"
   mkdir -p "$work"
   # The recordings that the tests replay, by the list of the tests.
-  mapfile -t names < <(cd "$build" && ctest -N -R '^replay: .*, record' | sed -nE 's/.*: replay: (\w+), record.*/\1/p')
+  mapfile -t names < <(cd "$build" && ctest -C coverage -N -R "$recordings" |
+    sed -nE 's/.*: replay: (\w+), record.*/\1/p')
   [ ${#names[@]} -gt 0 ] || { say "no recordings in the build"; return 1; }
   mapfile -t sources < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d; s|^|rtl/|' rtl/files.f)
   # Relative names make the report the same everywhere.
   for entity in psweep psweep_top; do
     bench=$build/tb/replay/${entity}_replay.vhd
     mkdir -p "$work/$entity"
-    "$ghdl" -a --std=93c --coverage --workdir="$work/$entity" "${sources[@]}"
-    "$ghdl" -a --std=93c --workdir="$work/$entity" "$bench"
+    "$ghdl" -a --std=93c --coverage --workdir="$work/$entity" "${sources[@]}" &&
+      "$ghdl" -a --std=93c --workdir="$work/$entity" "$bench" || return 1
   done
   export -f replay_one
   export ghdl work build
@@ -103,12 +107,15 @@ count_toggles() {
     { tail -n 20 "$work/configure.log"; return 1; }
   local targets
   mapfile -t targets < <(ninja -C "$work/build" -t targets all | sed -nE 's/^(test_\w+): phony$/\1/p' | sort -u)
-  mapfile -t programs < <(cd "$work/build" && for t in "${targets[@]}"; do
-    for folder in units engine chip; do [ -d tb/$folder ] && grep -qE "/$t\.cpp" build.ninja && [ -e "$root/tb/$folder/$t.cpp" ] &&
-      echo "$folder/$t"; done; done)
+  mapfile -t programs < <(for t in "${targets[@]}"; do
+    for folder in units engine chip; do
+      if [ -e "tb/$folder/$t.cpp" ]; then echo "$folder/$t"; fi
+    done
+  done)
   [ ${#programs[@]} -gt 0 ] || { say "no tests"; return 1; }
   say "toggles: building ${#programs[@]} test programs"
-  ninja -C "$work/build" -j "$jobs" "${programs[@]##*/}" > "$work/build.log" 2>&1 || { tail -n 20 "$work/build.log"; return 1; }
+  ninja -C "$work/build" -j "$jobs" "${programs[@]##*/}" > "$work/build.log" 2>&1 ||
+    { tail -n 20 "$work/build.log"; return 1; }
   local program number=0 code
   for program in "${programs[@]}"; do
     number=$((number + 1))
