@@ -29,15 +29,18 @@ die "mutants: --count wants a number\n" unless defined $count && $count =~ /^\d+
 die "mutants: --seed wants a number\n"  unless defined $seed  && $seed  =~ /^\d+$/;
 
 # Which tests look at an entity, in order, ' : ' and names of cases where not all of a program are wanted. Waves are
-# left out of these builds, so the case of test_chip that opens some is, too; and so are the two largest engines.
-my @engine = ('test_errors', 'test_engine', 'test_rtl_engine : rtl engine: extreme*');
-my @chip   = ('test_fuzz', 'test_chip : ~chip: recording*');
+# left out of these builds, so the case of test_chip that opens some is, too; and so are the two largest engines. Last
+# the original VHDL in GHDL, which checks bounds and assertions: a recording of the mutant, replayed on the mutant.
+my @engine = ('test_errors', 'test_engine', 'test_rtl_engine : rtl engine: extreme*',
+              'record_engine : ^replay: (tiny|odd|rectified),');
+my @chip   = ('test_fuzz', 'test_chip : ~chip: recording*', 'record_chip : ^replay: chip_odd,');
+my %replay = (record_engine => 'psweep_replay', record_chip => 'psweep_top_replay');
 my %first  = (
   psweep_pkg => ['test_address_generator', 'test_ram_sdp', 'test_storage', 'test_updating'],
   eth_pkg    => ['test_mac_rx', 'test_mac_tx', 'test_packet_rx'],
 );
 my %folder = (test_errors => 'engine', test_engine => 'engine', test_rtl_engine => 'engine', test_fuzz => 'chip',
-              test_chip => 'chip');
+              test_chip => 'chip', record_engine => 'replay', record_chip => 'replay');
 
 # The entities -----------------------------------------------------------------------------------------------------
 my (@entities, %chain, %text);
@@ -332,7 +335,7 @@ sub synchronise {
     (my $file = $File::Find::name) =~ s{^\Q$tree\E/}{};
     unlink $File::Find::name if -f $File::Find::name && !$wanted_file{$file};
   }, no_chdir => 1}, $tree);
-  return md5_hex(join "\n", sort grep { !m{^(scripts/(?!cmake)|tb/(model|waves|replay|dissector)/)} } @hashes);
+  return md5_hex(join "\n", sort grep { !m{^(scripts/(?!cmake)|tb/(model|waves|dissector)/)} } @hashes);
 }
 
 # Runs a command with a time limit, output into a file. Returns its exit code, -1 for the limit, and the seconds.
@@ -357,11 +360,15 @@ sub run {
   }
 }
 
+# The program, its targets, the command.
 sub test_parts {
   my ($test) = @_;
   my ($program, $filter) = split / : /, $test, 2;
+  return ($program, [$program, $replay{$program}],
+          ['ctest', '--test-dir', 'build', '--no-tests=error', '--output-on-failure', '-R', $filter])
+    if $replay{$program};
   my $folder = $folder{$program} || 'units';
-  return ($program, "build/tb/$folder/$program", defined $filter ? $filter : ());
+  return ($program, [$program], ["build/tb/$folder/$program", '-a', defined $filter ? $filter : ()]);
 }
 
 sub prepare {
@@ -401,13 +408,13 @@ sub baseline {
   my ($test) = @_;
   locked(\&known_baselines);
   return if defined $seconds{$test};
-  my ($program, $binary, @filter) = test_parts($test);
+  my ($program, $targets, $command) = test_parts($test);
   my $log = getcwd() . '/baseline.log';
-  my ($code) = run($log, 3600, 0, 'ninja', '-C', 'build', '-j1', $program);
+  my ($code) = run($log, 3600, 0, 'ninja', '-C', 'build', '-j1', @$targets);
   die "mutants: $program cannot be built: $log\n" if $code != 0;
-  ($code, my $took) = run($log, 1800, 0, $binary, '-a', @filter);
+  ($code, my $took) = run($log, 1800, 0, @$command);
   die "mutants: $test fails on the circuit as it is: $log\n"
-    if $code != 0 || slurp($log) !~ /All tests passed \([1-9]/;
+    if $code != 0 || slurp($log) !~ /All tests passed \([1-9]|100% tests passed, 0 tests failed out of [1-9]/;
   printf "mutants: the circuit as it is passes %s (%d s)\n", $test, $took;
   locked(sub {
     known_baselines();
@@ -459,15 +466,15 @@ sub test_mutant {
   my ($verdict, $by) = ('SURVIVED', '-');
   spew($log, shown($m) . "\n");
   for my $test (@{$chain{$m->{entity}}}) {
-    my ($program, $binary, @filter) = test_parts($test);
+    my ($program, $targets, $command) = test_parts($test);
     if (!defined $seconds{$test}) {
       spew($file, join("\n", @$original) . "\n");
       baseline($test);
     }
     spew($file, join("\n", @lines) . "\n");
-    my ($code) = run($log, 900, 1, 'ninja', '-C', 'build', '-j1', $program);
+    my ($code) = run($log, 900, 1, 'ninja', '-C', 'build', '-j1', @$targets);
     if ($code != 0) { $verdict = 'invalid'; last }
-    ($code) = run($log, 20 + 3 * $seconds{$test}, 1, $binary, '-a', @filter);
+    ($code) = run($log, 20 + 3 * $seconds{$test}, 1, @$command);
     if ($code == -1) { $verdict = 'killed, no end'; $by = $program; last }
     if ($code >= 126 && $code <= 127) { die "mutants: $program cannot be run: $log\n" }
     if ($code != 0) { $verdict = 'killed'; $by = $program; last }
