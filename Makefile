@@ -59,6 +59,11 @@ sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recor
 	@scripts/build.sh record_engine
 	@scripts/sim_gates.sh
 
+.PHONY: cost
+cost: ## LUT, FF, block RAM, DSP of the engine by Yosys for Virtex-6 (minutes); scripts/cost.sh ENTITY: of one entity
+	@scripts/setup.sh build gates
+	@scripts/cost.sh
+
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
 	@scripts/build.sh psweep
