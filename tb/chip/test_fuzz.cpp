@@ -515,7 +515,7 @@ class Fuzz {
     const bool large = one_in(4);
     const int cols = 1 + below(large ? c.plane_cols : std::min(6, c.plane_cols));
     const int rows = 1 + below(large ? c.plane_rows : std::min(4, c.plane_rows));
-    return maker_.make(static_cast<tb::Texture>(below(4)), static_cast<tb::Geometry>(below(4)), cols, rows,
+    return maker_.make(static_cast<tb::Texture>(below(5)), static_cast<tb::Geometry>(below(4)), cols, rows,
                        1 + below(std::min(most_planes, large ? most_planes : 3)));
   }
   // Plane table for the tiles to come, and the next of them.

@@ -18,7 +18,13 @@ struct Stimulus {
   golden::Pixels left, right;  // win_cols x win_rows
 };
 
-enum class Texture { kStereo, kRandom, kConstant, kSaturated };
+enum class Texture {
+  kStereo,  // has a best plane at every cell
+  kRandom,
+  kConstant,
+  kSaturated,  // 0 and all ones
+  kFaint,      // constant but for a few pixels, by 1: the smallest variances
+};
 enum class Geometry {
   kInside,  // every sample inside the images and loaded, steps near 1
   kBorder,  // the tile begins outside the images, at whole steps (bounds are hit exactly)
@@ -36,7 +42,7 @@ class StimulusMaker {
   static int32_t fixed(double pixels) { return static_cast<int32_t>(std::lround(pixels * (1 << golden::kPosFrac))); }
 
   Stimulus make(Texture texture, Geometry geometry, int tile_cols, int tile_rows, int planes) {
-    static const char* const textures[] = {"stereo", "random", "constant", "saturated"};
+    static const char* const textures[] = {"stereo", "random", "constant", "saturated", "faint"};
     static const char* const geometries[] = {"inside", "border", "skewed", "lost"};
     Stimulus s;
     s.name = std::string(textures[static_cast<int>(texture)]) + " texture, " + geometries[static_cast<int>(geometry)] +
@@ -115,13 +121,14 @@ class StimulusMaker {
       for (auto* image : {&s.left, &s.right})
         for (auto& pixel : image->data)
           pixel = texture == Texture::kConstant    ? level
+                  : texture == Texture::kFaint     ? static_cast<uint16_t>(level ^ (below(12) == 0 ? 1 : 0))
                   : texture == Texture::kSaturated ? static_cast<uint16_t>(below(2) * top)
                                                    : static_cast<uint16_t>(below(top + 1));
     }
     return s;
   }
   Stimulus any() {
-    return make(static_cast<Texture>(below(4)), static_cast<Geometry>(below(4)), 1 + below(config_.plane_cols),
+    return make(static_cast<Texture>(below(5)), static_cast<Geometry>(below(4)), 1 + below(config_.plane_cols),
                 1 + below(config_.plane_rows), 1 + below(config_.planes));
   }
 

@@ -15,7 +15,7 @@ TEMPLATE_TEST_CASE("engine: every texture in every geometry, back to back", "", 
   EngineBench<typename TestType::Dut> bench(config, seed);
   StimulusMaker maker(config, seed);
   uint64_t found = 0;
-  for (int texture = 0; texture < 4; ++texture) {
+  for (int texture = 0; texture < 5; ++texture) {
     for (int geometry = 0; geometry < 4; ++geometry) {
       const bool full = geometry == 0;
       bench.run(maker.make(static_cast<Texture>(texture), static_cast<Geometry>(geometry),

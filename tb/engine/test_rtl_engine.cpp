@@ -170,7 +170,7 @@ TEST_CASE("rtl engine: extreme formats, random tiles") {
   Scoreboard cells("cell");
   for (int tile = 0; tile < 40; ++tile) {
     const int planes = tile == 0 ? c.config.planes : 1 + maker.below(std::min(c.config.planes, 40));
-    const Stimulus s = maker.make(static_cast<Texture>(tile % 4), static_cast<Geometry>(maker.below(4)),
+    const Stimulus s = maker.make(static_cast<Texture>(tile % 5), static_cast<Geometry>(maker.below(4)),
                                   1 + maker.below(c.config.plane_cols), 1 + maker.below(c.config.plane_rows), planes);
     engine.set_table(s.table);
     const auto out = engine.run(s.job, s.left, s.right);

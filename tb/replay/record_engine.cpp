@@ -124,6 +124,7 @@ TEST_CASE("record: a session of good, refused, cut and aborted tiles") {
     session.good(Texture::kSaturated, Geometry::kLost);
     for (const State state : {State::kLoad, State::kSweep, State::kUnload}) session.interrupted(state, false);
     session.good(Texture::kConstant, Geometry::kBorder);
+    session.good(Texture::kFaint, Geometry::kInside);
     session.interrupted(State::kSweep, true);
     session.good(Texture::kStereo, Geometry::kBorder);
     for (int i = 0; i < tiles; ++i) session.any(most_clocks);

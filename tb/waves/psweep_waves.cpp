@@ -46,7 +46,7 @@ int run(const Options& o) {
   const int stage = index_of(stages(), o.stage, "stage");
   const golden::Config& config = engine.config;
   const auto texture =
-      static_cast<tb::Texture>(index_of({"stereo", "random", "constant", "saturated"}, o.texture, "texture"));
+      static_cast<tb::Texture>(index_of({"stereo", "random", "constant", "saturated", "faint"}, o.texture, "texture"));
   const auto geometry =
       static_cast<tb::Geometry>(index_of({"inside", "border", "skewed", "lost"}, o.geometry, "geometry"));
   auto stimulus_of = [&](uint32_t seed) {
@@ -90,7 +90,7 @@ int main_function(int argc, char** argv) {
   app.add_option("--plane", o.plane, "Plane, from 0; default: the middle one");
   app.add_option("--cell", o.cell, "COLUMN,ROW of the cell, from 0; default: the middle one");
   app.add_option("--out", o.out, "Folder of the files")->capture_default_str();
-  app.add_option("--texture", o.texture, "Images: stereo, random, constant, saturated")->capture_default_str();
+  app.add_option("--texture", o.texture, "Images: stereo, random, constant, saturated, faint")->capture_default_str();
   app.add_option("--geometry", o.geometry, "Planes: inside, border, skewed (sub-pixel, unequal steps), lost")
       ->capture_default_str();
   app.add_option("--seed", o.seed, "Of the images")->capture_default_str();
