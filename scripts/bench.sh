@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Speed on this machine: the bit-true model at 1120x1120 with 301 planes on one core, by instruction set
 # (psweep_bench); clocks a second of the simulated engine on one core, a tile of 256x130 cells (one_tile, three times,
-# as other work on the machine shows); then all three engines on one rendered scene (seconds and clocks from report.json).
+# as other work on the machine shows); then all three engines on one rendered scene (seconds and clocks: report.json).
 #
 #   scripts/bench.sh [--size N] [--planes N]      scene of the last part, default 400 and 109
 set -euo pipefail
