@@ -53,6 +53,11 @@ sim-ghdl: build ## More recorded streams on the original VHDL in GHDL: every con
 rules: build ## The assertions in the VHDL speak when they should: a fault each, in GHDL (10 s)
 	@scripts/rules.sh
 
+.PHONY: flips
+flips: setup ## Upsets of single bits in control, plane table and map: nothing may hang (a minute)   ALL=1: all registers
+	@scripts/build.sh flips
+	@scripts/flips.sh $(if $(ALL),--all) $(if $(SEED),--seed $(SEED))
+
 .PHONY: sim-gates
 sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recorded streams; broken cells are noticed
 	@scripts/setup.sh gates

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # VHDL entity + generics -> Verilated C++ library.
 #
-#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES])
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [EDIT <script>])
 #     Static library <name> with header V<name>.h (class V<name>) for entity rtl/<entity>.vhd. TRACE: the model can
 #     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
 #     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).
+#     EDIT: perl <script> IN.v OUT.v <name>.inc changes the Verilog first; the third file is its own.
 #   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
 #     ctest case: elaboration with these generics has to fail, and the message has to match.
 #
@@ -89,7 +90,7 @@ function(psweep_rtl_sources entity out)
 endfunction()
 
 function(rtl_model name)
-  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES" "TOP" "GENERICS" ${ARGN})
+  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES" "TOP;EDIT" "GENERICS" ${ARGN})
   psweep_rtl_sources(${A_TOP} sources)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
   set(obj ${dir}/obj)
@@ -113,9 +114,9 @@ function(rtl_model name)
     OUTPUT ${dir}/${A_TOP}.v
     COMMAND
       ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
-      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES} -P
-      ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
-    DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
+      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES} -D EDIT=${A_EDIT}
+      -D NOTES=${dir}/${name}.inc -P ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
+    DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake ${A_EDIT}
     COMMENT "GHDL ${name}"
     VERBATIM)
   set(waivers ${PSWEEP_RTL_MODEL_DIR}/ghdl_netlist.vlt)
