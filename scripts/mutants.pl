@@ -475,7 +475,7 @@ sub test_mutant {
       baseline($test);
     }
     spew($file, join("\n", @lines) . "\n");
-    my ($code) = @$targets ? run($log, 900, 1, 'ninja', '-C', 'build', '-j1', @$targets) : (0);
+    my ($code) = @$targets ? run($log, 400, 1, 'ninja', '-C', 'build', '-j1', @$targets) : (0);
     if ($code != 0) { $verdict = 'invalid'; last }
     ($code) = run($log, 20 + 3 * $seconds{$test}, 1, @$command);
     if ($code == -1) { $verdict = 'killed, no end'; $by = $program; last }
