@@ -58,6 +58,15 @@ flips: setup ## Upsets of single bits in control, plane table and map: nothing m
 	@scripts/build.sh flips
 	@scripts/flips.sh $(if $(ALL),--all) $(if $(SEED),--seed $(SEED))
 
+.PHONY: soak
+soak: setup ## Random tiles, good and bad, with stalls, resets, aborts: everything is counted   TILES=10000 SEED=n
+	@scripts/build.sh soak
+	@scripts/soak.sh $(if $(TILES),--tiles $(TILES)) $(if $(SEED),--seed $(SEED))
+
+.PHONY: sweep
+sweep: setup ## Engines of random sizes and formats, each built and tried (5 minutes)   COUNT=10 SEED=n
+	@scripts/sweep.sh $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED))
+
 .PHONY: sim-gates
 sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recorded streams; broken cells are noticed
 	@scripts/setup.sh gates
