@@ -47,6 +47,13 @@ sub edit {
       "    $register <= $value ^ (psweep.flip_site == $number ? " . mask($bits{$register}) . " : $bits{$register}'d0);"
     } else { "    $register <= $value;" }
   }gme;
+  # None of control may get lost, however the converter writes it.
+  if ($entity eq 'control') {
+    while ($body =~ /^  reg (?:\[\d+:0\] )?(\w+)/mg) {
+      $body =~ /^    \Q$1\E <= \w+ \^ \(psweep\.flip_site == /m
+        or die "inject.pl: register $1 of control was not understood\n";
+    }
+  }
   if ($entity =~ /^ram_/ && $body =~ /reg (?:\[(\d+):0\] )?memory\[(\d+):0\]/) {
     my ($width, $words) = (($1 // 0) + 1, $2 + 1);
     my $number = site($entity, "${where}memory", $width, $words);
