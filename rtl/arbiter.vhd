@@ -98,7 +98,7 @@ architecture rtl of arbiter is
     if G_ROW_SLOTS > 0 then
       return G_ROW_SLOTS;
     end if;
-    return imax(2, (G_IMG_COLS * G_IMG_ROWS + C_CHUNK_PAIRS - 1) / C_CHUNK_PAIRS);
+    return imax(2, (G_IMG_COLS * G_IMG_ROWS + C_CHUNK_PAIRS - 1) / imax(C_CHUNK_PAIRS, 1)); -- 0: refused below
   end function row_slots;
 
   function map_depth return integer is

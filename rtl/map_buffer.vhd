@@ -67,11 +67,12 @@ architecture rtl of map_buffer is
   constant C_WHOLE      : boolean := G_DEPTH >= G_CELLS;
   constant C_DEPTH      : integer := imax(2, smaller(G_DEPTH, G_CELLS));
   constant C_ADDR_W     : integer := clog2(C_DEPTH);
-  constant C_RING       : integer := G_DEPTH / G_CHUNK_CELLS; -- chunks
+  constant C_CHUNK      : integer := imax(G_CHUNK_CELLS, 1); -- 0 is refused below
+  constant C_RING       : integer := G_DEPTH / C_CHUNK;      -- chunks
   constant C_TURN       : integer := imax(0, C_DEPTH - G_CHUNK_CELLS); -- where the ring's last chunk starts
   constant C_INDEX_W    : integer := clog2(G_CHUNK_CELLS);
   constant C_COUNT_W    : integer := clog2(G_CELLS + 1);
-  constant C_CHUNK_W    : integer := clog2((G_CELLS + G_CHUNK_CELLS - 1) / G_CHUNK_CELLS + 1);
+  constant C_CHUNK_W    : integer := clog2((G_CELLS + C_CHUNK - 1) / C_CHUNK + 1);
   constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
 
   -- Write.
@@ -116,10 +117,10 @@ begin
     report "map_buffer: G_CHUNK_CELLS=" & integer'image(G_CHUNK_CELLS) & " outside 2..2048"
     severity failure;
   -- Numbers of chunks have 16 bits.
-  assert G_CELLS >= 1 and G_CELLS < 2 ** 24 and G_CELLS / G_CHUNK_CELLS < 65535
+  assert G_CELLS >= 1 and G_CELLS < 2 ** 24 and G_CELLS / C_CHUNK < 65535
     report "map_buffer: G_CELLS=" & integer'image(G_CELLS) & " outside 1..16777215 or over 65535 chunks"
     severity failure;
-  assert G_DEPTH >= G_CELLS or (G_DEPTH >= G_CHUNK_CELLS and G_DEPTH mod G_CHUNK_CELLS = 0)
+  assert G_DEPTH >= G_CELLS or (G_DEPTH >= G_CHUNK_CELLS and G_DEPTH mod C_CHUNK = 0)
     report "map_buffer: G_DEPTH=" & integer'image(G_DEPTH) & " is neither G_CELLS nor one or more chunks"
     severity failure;
 

@@ -45,7 +45,7 @@ package psweep_pkg is
 
   -- Last sample of a window to its cell; cell to its write into the map.
   function similarity_latency (mncc_w : positive) return positive;
-  function updating_latency (frac_w, lanes : positive) return positive;
+  function updating_latency (frac_w, lanes : integer) return positive;
 
   -- Bits that hold 0 .. n-1, at least 1. An illegal n (below 1) is for the assertion of who uses it to report.
   function clog2 (n : integer) return positive;
@@ -71,7 +71,7 @@ package body psweep_pkg is
     return 16 + mncc_w;
   end function similarity_latency;
 
-  function updating_latency (frac_w, lanes : positive) return positive is
+  function updating_latency (frac_w, lanes : integer) return positive is
   begin
     return 3 + lanes + frac_w;
   end function updating_latency;
