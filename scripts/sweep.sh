@@ -86,11 +86,13 @@ done
 [ ${#names[@]} -gt 0 ] || { echo "sweep.sh: no configuration $only among $count" >&2; exit 2; }
 
 echo "sweep: seed $seed, building ${#names[@]} engines"
-cmake -S . -B "$out/build" -G Ninja -DPSWEEP_SWEEP=ON > "$out/cmake.log" 2>&1 || { tail -n 20 "$out/cmake.log"; exit 1; }
+cmake -S . -B "$out/build" -G Ninja -DPSWEEP_SWEEP=ON > "$out/cmake.log" 2>&1 ||
+  { tail -n 20 "$out/cmake.log"; exit 1; }
 rm -rf "$out/build/configs"
 cp -r "$out/configs" "$out/build/configs"
 cmake "$out/build" > "$out/cmake.log" 2>&1 || { tail -n 20 "$out/cmake.log"; exit 1; }
-ninja -C "$out/build" -j "$jobs" soak > "$out/build.log" 2>&1 || { grep -v '^\[' "$out/build.log" | tail -n 30; exit 1; }
+ninja -C "$out/build" -j "$jobs" soak > "$out/build.log" 2>&1 ||
+  { grep -v '^\[' "$out/build.log" | tail -n 30; exit 1; }
 failed=0
 for i in "${!names[@]}"; do
   name=${names[$i]}
