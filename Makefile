@@ -54,12 +54,12 @@ rules: build ## The assertions in the VHDL speak when they should: a fault each,
 	@scripts/rules.sh
 
 .PHONY: flips
-flips: setup ## Upsets of single bits in control, plane table and map: nothing may hang (a minute)   ALL=1: all registers
+flips: setup ## Upsets of single bits in control, plane table, map: nothing hangs (a minute)   ALL=1: all registers
 	@scripts/build.sh flips
 	@scripts/flips.sh $(if $(ALL),--all) $(if $(SEED),--seed $(SEED))
 
 .PHONY: soak
-soak: setup ## Random tiles, good and bad, with stalls, resets, aborts: everything is counted   TILES=10000 SEED=n
+soak: setup ## Random tiles, good and bad, with stalls and resets: all is counted   TILES=10000 SEED=n
 	@scripts/build.sh soak
 	@scripts/soak.sh $(if $(TILES),--tiles $(TILES)) $(if $(SEED),--seed $(SEED))
 

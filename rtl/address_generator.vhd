@@ -70,10 +70,10 @@ entity address_generator is
     m_fy_right    : out std_logic_vector(G_WEIGHT_W - 1 downto 0);
     -- Bank address of column 0 of the sample's upper and lower neighbours: the even and the odd one of rows yi, yi+1.
     -- With G_RECTIFIED both are row yi. Meaningful where m_usable_y.
-    m_row_even_left  : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
-    m_row_odd_left   : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
-    m_row_even_right : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
-    m_row_odd_right  : out std_logic_vector(clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    m_row_even_left  : out std_logic_vector(bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
+    m_row_odd_left   : out std_logic_vector(bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
+    m_row_even_right : out std_logic_vector(bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
+    m_row_odd_right  : out std_logic_vector(bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
     m_usable_x       : out std_logic;
     m_usable_y       : out std_logic;
     m_window_error   : out std_logic  -- inside both images, not loaded in at least one; only with m_valid
@@ -84,7 +84,7 @@ architecture rtl of address_generator is
 
   constant C_PITCH  : integer := G_IMG_COLS / 2;
   constant C_ROW_W  : integer := clog2(bank_depth(2, G_IMG_ROWS, G_RECTIFIED)); -- of the number of a bank's row
-  constant C_BANK_W : integer := clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED));
+  constant C_BANK_W : integer := bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
 
   -- Sum of v * 2^k over every second set bit k of C_PITCH, beginning with the set bit number `phase`: the sum of both
   -- phases is v * C_PITCH. Two short adder chains, so that neither a multiplier is needed nor a long path.

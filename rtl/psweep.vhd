@@ -113,7 +113,7 @@ architecture rtl of psweep is
   constant C_LANE_W   : integer := G_LANES / 2; -- bits of a lane's number: 0, 1 or 2
   constant C_SETS     : integer := plane_sets(G_PLANES, G_LANES);
   constant C_SET_W    : integer := clog2(C_SETS);
-  constant C_BANK_W   : integer := clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED));
+  constant C_BANK_W   : integer := bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
   constant C_SAMPLE_W : integer := G_PIX_W + G_INTERP_F;
   -- From a sample's strobe to the write of the cell that it completes.
   constant C_LATENCY  : integer := C_ADDRESS_LATENCY + C_STORAGE_LATENCY + interpolation_latency(G_RECTIFIED)

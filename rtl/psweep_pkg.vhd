@@ -58,6 +58,8 @@ package psweep_pkg is
   -- Words of a bank of storage. Four banks an image, by the parities of x and y; two, by the parity of x, in a build
   -- for rectified pairs.
   function bank_depth (cols, rows, rectified : integer) return integer;
+  -- Bits of its addresses.
+  function bank_bits (cols, rows, rectified : integer) return positive;
 
   -- true is '1'
   function to_bit (b : boolean) return std_logic;
@@ -116,6 +118,11 @@ package body psweep_pkg is
     end if;
     return cols / 2 * (rows / 2);
   end function bank_depth;
+
+  function bank_bits (cols, rows, rectified : integer) return positive is
+  begin
+    return clog2(bank_depth(cols, rows, rectified));
+  end function bank_bits;
 
   function to_bit (b : boolean) return std_logic is
   begin

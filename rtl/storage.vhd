@@ -56,10 +56,10 @@ entity storage is
     s_yi_right       : in  std_logic_vector(G_LANES * C_INT_W - 1 downto 0);
     s_fx_right       : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
     s_fy_right       : in  std_logic_vector(G_LANES * G_WEIGHT_W - 1 downto 0);
-    s_row_even_left  : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
-    s_row_odd_left   : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
-    s_row_even_right : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
-    s_row_odd_right  : in  std_logic_vector(G_LANES * clog2(bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED)) - 1 downto 0);
+    s_row_even_left  : in  std_logic_vector(G_LANES * bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
+    s_row_odd_left   : in  std_logic_vector(G_LANES * bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
+    s_row_even_right : in  std_logic_vector(G_LANES * bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
+    s_row_odd_right  : in  std_logic_vector(G_LANES * bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
 
     -- p10 is the right neighbour of p00, p01 the one below. m_fy_* hold for a row, like s_fy_*.
     m_valid       : out std_logic_vector(G_LANES - 1 downto 0);
@@ -87,7 +87,7 @@ architecture rtl of storage is
 
   constant C_PITCH  : integer := G_IMG_COLS / 2;
   constant C_DEPTH  : integer := bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
-  constant C_BANK_W : integer := clog2(C_DEPTH);
+  constant C_BANK_W : integer := bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
   constant C_COL_W  : integer := clog2(G_IMG_COLS);
   constant C_COPIES : integer := G_LANES / 2;
 

@@ -529,7 +529,8 @@ begin
   -- synthesis translate_off
   -- Rules, in simulators.
   p_rules : process (clk)
-    variable v_way : std_logic; -- a cell is on its way to the map
+    variable v_way  : std_logic; -- a cell is on its way to the map
+    variable v_both : unsigned(G_MNCC_W downto 0);
   begin
     if rising_edge(clk) then
       v_way := s_valid(0) or s1_valid;
@@ -555,8 +556,8 @@ begin
         report "updating: more cells than the map has"
         severity failure;
       if way_in_valid(G_LANES) = '1' and way_parabola(G_LANES) = '1' then
-        assert unsigned(s3_num) <= unsigned(way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1)))
-               and unsigned(way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1))) /= 0
+        v_both := unsigned(way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1)));
+        assert unsigned(s3_num) <= v_both and v_both /= 0
           report "updating: the parabola's quotient is not in 0..1"
           severity failure;
       end if;
