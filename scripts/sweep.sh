@@ -34,35 +34,37 @@ out=build/sweep
 rm -rf "$out/configs" "$out"/*.log "$out/results.txt"
 mkdir -p "$out/configs"
 
+# No $( ): a subshell draws from a generator that bash seeds with time and process, so nothing could be repeated.
 RANDOM=$((seed % 32768))
-pick() { # pick VALUE ..: one of them
-  local all=("$@")
-  echo "${all[$((RANDOM % ${#all[@]}))]}"
+for ((k = 0; k < 8; k++)); do : "$RANDOM"; done # first values of seeds side by side are alike
+pick() { # pick NAME VALUE ..: one of them
+  local all=("${@:2}")
+  printf -v "$1" %s "${all[$((RANDOM % ${#all[@]}))]}"
 }
-between() { echo $(($1 + (RANDOM * 32768 + RANDOM) % ($2 - $1 + 1))); }
+between() { # between NAME LOW HIGH
+  printf -v "$1" %d "$(($2 + (RANDOM * 32768 + RANDOM) % ($3 - $2 + 1)))"
+}
 primes=(2 3 5 7 11 13 17 19 23 29 31 37)
 names=() wanted=()
 window=0 cols=0 rows=0 planes=0 lanes=0 pix=0 weight=0 interp=0 mncc=0 frac=0 rectified=0 disparity=0 prime=0
 # Drawn in this shell, one after the other, so that --only finds the same.
 for ((k = 1; k <= count; k++)); do
-  # A subshell draws from a copy of the generator: each gets a start of its own.
-  draw() { eval "$1=\$(${*:2})"; RANDOM=$(((RANDOM * 7 + 13 * k + ${#1}) % 32768)); }
-  draw window pick 3 5 7 9 11 13 15 17 19 21
-  draw cols between 1 40
-  draw rows between 1 24
-  draw planes between 1 12
-  draw lanes pick 1 1 2 4
-  draw pix between 1 12
-  draw weight between 1 12
-  draw interp between 0 8
-  draw mncc between 4 16
-  draw frac between 2 12
-  draw rectified pick 0 0 1
-  draw disparity between 0 12
-  draw prime pick 0 1
+  pick window 3 5 7 9 11 13 15 17 19 21
+  between cols 1 40
+  between rows 1 24
+  between planes 1 12
+  pick lanes 1 1 2 4
+  between pix 1 12
+  between weight 1 12
+  between interp 0 8
+  between mncc 4 16
+  between frac 2 12
+  pick rectified 0 0 1
+  between disparity 0 12
+  pick prime 0 1
   if [ "$prime" -eq 1 ]; then
-    draw cols pick "${primes[@]}"
-    draw rows pick "${primes[@]}"
+    pick cols "${primes[@]}"
+    pick rows "${primes[@]}"
   fi
   case $k in
     1) window=21 cols=1 rows=1 planes=1 lanes=1 ;;      # one cell, one plane, the largest window

@@ -35,8 +35,8 @@ golden::Pixels pixels(int cols, int rows, uint32_t seed) {
 }
 
 struct Bench {
-  explicit Bench(bool half_duplex)
-      : desk(chip.make(), settings(half_duplex)), client(transport, 1.0, 1), capabilities(client.info()) {
+  explicit Bench(bool half_duplex, uint32_t seed = 1)
+      : desk(chip.make(), settings(half_duplex, seed)), client(transport, 1.0, 1), capabilities(client.info()) {
     const golden::Config& e = config.engine;
     job.tile_cols = e.plane_cols;
     job.tile_rows = e.plane_rows;
@@ -46,9 +46,10 @@ struct Bench {
     job.left = job.right = {0, job.win_cols - 1, 0, job.win_rows - 1};
     plane.dx_left = plane.dy_left = plane.dx_right = plane.dy_right = 1u << golden::kPosFrac;
   }
-  static DeskSettings settings(bool half_duplex) {
+  static DeskSettings settings(bool half_duplex, uint32_t seed) {
     DeskSettings s;
     s.half_duplex = half_duplex;
+    s.seed = seed;
     return s;
   }
   net::LinkTile tile(int number) const {
@@ -201,21 +202,30 @@ TEST_CASE("goodput: rows up and map down at once, full duplex, at least 90 Mbit/
   CHECK(b.desk.link().violations() == 0);
 }
 
+// Who wins a collision is chance, and whoever wins is likely to win again: so the mean of several runs.
 TEST_CASE("goodput: both directions together, half duplex, at least 81 Mbit/s") {
-  Bench b(true);
-  Both both(b);
-  both.run(kAnswerEvery, true);
-  both.finish();
-  const double up = mbit(both.up, both.took), down = mbit(both.down, both.took);
-  const uint64_t lost = b.lost();
-  std::printf(
-      "half duplex: %.2f Mbit/s up + %.2f Mbit/s down = %.2f; %llu collisions of the station, %zu chunks repeated, "
-      "%llu frames without slot\n",
-      up, down, up + down, static_cast<unsigned long long>(b.desk.link().collisions), both.repeated,
-      static_cast<unsigned long long>(lost));
-  CHECK(up + down >= 81);
-  CHECK(b.desk.link().late == 0);
-  CHECK(b.desk.link().violations() == 0);
+  constexpr int kRuns = 6;
+  double sum = 0;
+  for (uint32_t seed = 1; seed <= kRuns; ++seed) {
+    INFO("seed " << seed);
+    Bench b(true, seed);
+    Both both(b);
+    both.run(kAnswerEvery, true);
+    both.finish();
+    const double up = mbit(both.up, both.took), down = mbit(both.down, both.took);
+    const uint64_t lost = b.lost();
+    std::printf(
+        "half duplex: %.2f Mbit/s up + %.2f Mbit/s down = %.2f; %llu collisions of the station, %zu chunks repeated, "
+        "%llu frames without slot\n",
+        up, down, up + down, static_cast<unsigned long long>(b.desk.link().collisions), both.repeated,
+        static_cast<unsigned long long>(lost));
+    sum += up + down;
+    CHECK(up + down >= 70);
+    CHECK(b.desk.link().late == 0);
+    CHECK(b.desk.link().violations() == 0);
+  }
+  std::printf("half duplex, mean of %d runs: %.2f Mbit/s\n", kRuns, sum / kRuns);
+  CHECK(sum / kRuns >= 81);
 }
 
 TEST_CASE("goodput: the host library keeps the link full, two tiles in flight") {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// flips [--short] [--all] [--seed N] [--only CONFIGURATION:SITE:BIT:CLOCK[:WORD]]: single-event upsets in the engine.
-// One bit of one register, or of one word of a RAM, is changed in one clock of a tile, and the bench goes on as a host
-// would: it waits for the tile, looks at errors, counters and the number of cells, aborts if something is wrong or
-// nothing ends, and sends the next tiles. inject.pl makes the circuit that can be changed.
+// flips [--short] [--all] [--seed N] [--only CONFIGURATION:SITE:BIT:CLOCK:WORD[:refused]]: single-event upsets in the
+// engine. One bit of one register, or of one word of a RAM, is changed in one clock of a tile, and the bench goes on as
+// a host would: it waits for the tile, looks at errors, counters and the number of cells, aborts if something is wrong
+// or nothing ends, and sends the next tiles. inject.pl makes the circuit that can be changed.
 //   hang       the engine was busy longer than the largest tile of the build takes, though all streams moved
 //   masked     map and status are as without the upset
 //   detected   an error bit, a dropped tile, or a wrong number of cells
@@ -340,18 +340,22 @@ class Campaign {
   }
   void complain(const char* what, const Upset& u, bool refused) const {
     const Site& site = sites_[static_cast<size_t>(u.site) - 1];
-    std::printf("flips: %s: %s: %s %s bit %d word %d, clock %lld%s; again: flips --seed %u --only %s:%d:%d:%lld:%d\n",
-                name_.c_str(), what, site.entity, site.name, u.bit, u.word, static_cast<long long>(u.clock),
-                refused ? " of a refused tile" : "", options_.seed, name_.c_str(), u.site, u.bit,
-                static_cast<long long>(u.clock), u.word);
+    std::printf(
+        "flips: %s: %s: %s %s bit %d word %d, clock %lld%s; again: build/tb/flips/flips --seed %u --only "
+        "%s:%d:%d:%lld:%d%s\n",
+        name_.c_str(), what, site.entity, site.name, u.bit, u.word, static_cast<long long>(u.clock),
+        refused ? " of a refused tile" : "", options_.seed, name_.c_str(), u.site, u.bit,
+        static_cast<long long>(u.clock), u.word, refused ? ":refused" : "");
   }
   bool one() {
     std::istringstream text(options_.only.substr(options_.only.find(':') + 1));
     Upset u;
     char colon = 0;
     text >> u.site >> colon >> u.bit >> colon >> u.clock >> colon >> u.word;
+    std::string rest;
+    text >> rest;
     if (u.site < 1 || u.site > static_cast<int>(sites_.size())) throw std::runtime_error("--only: no such site");
-    experiment(u, false);
+    experiment(u, rest == ":refused");
     return report();
   }
   bool report() const {
@@ -408,7 +412,8 @@ int main(int argc, char** argv) {
     } else if (arg == "--only" && i + 1 < argc) {
       options.only = argv[++i];
     } else {
-      std::fprintf(stderr, "usage: flips [--short] [--all] [--seed N] [--only CONFIGURATION:SITE:BIT:CLOCK[:WORD]]\n");
+      std::fprintf(stderr,
+                   "usage: flips [--short] [--all] [--seed N] [--only CONFIGURATION:SITE:BIT:CLOCK:WORD[:refused]]\n");
       return 2;
     }
   }
