@@ -54,7 +54,8 @@ endif()
 
 # The run-time library comes with Verilator as source.
 add_library(verilated_rt STATIC ${PSWEEP_VERILATOR_ROOT}/include/verilated.cpp
-                                ${PSWEEP_VERILATOR_ROOT}/include/verilated_threads.cpp ${coverage_source})
+                                ${PSWEEP_VERILATOR_ROOT}/include/verilated_threads.cpp ${coverage_source}
+                                ${PSWEEP_RTL_MODEL_DIR}/inputs_changed.cpp)
 target_include_directories(verilated_rt SYSTEM PUBLIC ${PSWEEP_VERILATOR_ROOT}/include
                                                       ${PSWEEP_VERILATOR_ROOT}/include/vltstd)
 target_compile_definitions(verilated_rt PUBLIC VM_COVERAGE=$<BOOL:${PSWEEP_COVERAGE}> VM_SC=0)
@@ -129,7 +130,7 @@ function(rtl_model name)
     COMMAND ${PSWEEP_VERILATOR} --cc ${flags} ${trace_flag} --prefix V${name} --Mdir ${obj}
             --top-module ${A_TOP} ${waivers} ${dir}/${A_TOP}.v
     COMMAND ${CMAKE_COMMAND} -D OBJ=${obj} -D FAST=${fast} -D SLOW=${slow}
-            -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
+            -D INPUTS=${A_BOTH_EDGES} -P ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
     DEPENDS ${dir}/${A_TOP}.v ${waivers} ${PSWEEP_RTL_MODEL_DIR}/VerilatedUnity.cmake
     COMMENT "Verilator ${name}"
     VERBATIM)

@@ -1,13 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-# cmake -D OBJ=<dir> -D FAST=<file> -D SLOW=<file> -P VerilatedUnity.cmake
+# cmake -D OBJ=<dir> -D FAST=<file> -D SLOW=<file> [-D INPUTS=ON] -P VerilatedUnity.cmake
 # Verilator decides how many C++ files it writes; CMake must know its sources beforehand. So two files include them
 # all: FAST the code of every clock, SLOW the rest (constructors, reset, tracing declarations).
+# INPUTS: what depends on inputs is evaluated only while psweep_inputs_changed (inputs_changed.cpp). Verilator does it
+# before every edge, which is an eighth of the work of an engine that sweeps. Versions that write it in another way stay
+# as they are, which costs speed only.
 file(GLOB files RELATIVE ${OBJ} ${OBJ}/*.cpp)
 list(SORT files)
 if(NOT files)
   message(FATAL_ERROR "Verilator wrote no C++ into ${OBJ}")
 endif()
 set(fast "")
+if(INPUTS)
+  set(fast "extern __thread bool psweep_inputs_changed;\n")
+  foreach(file IN LISTS files)
+    file(READ ${OBJ}/${file} text)
+    set(edited "${text}")
+    foreach(first "(0U == vlSelf->__VicoIterCount)" "(IData)(vlSelfRef.__VicoFirstIteration)")
+      string(REPLACE "Triggered.at(0U) = ${first};" "Triggered.at(0U) = ${first} && psweep_inputs_changed;" edited
+                     "${edited}")
+      string(REPLACE "VicoTriggered.setBit(0U, ${first});"
+                     "VicoTriggered.setBit(0U, ${first} && psweep_inputs_changed);" edited "${edited}")
+    endforeach()
+    if(NOT edited STREQUAL text)
+      file(WRITE ${OBJ}/${file} "${edited}")
+    endif()
+  endforeach()
+endif()
 set(slow "")
 foreach(file IN LISTS files)
   if(file MATCHES "__Slow\\.cpp$|__Syms\\.cpp$")

@@ -12,6 +12,8 @@
 #include "rtl/rtl_engine.hpp"
 #include "support/coverage.hpp"
 
+extern __thread bool psweep_inputs_changed;  // scripts/cmake/inputs_changed.cpp
+
 namespace psweep::rtl {
 
 class EngineModel {
@@ -142,12 +144,16 @@ class VerilatedEngine : public EngineModel {
     dut_->s_pix_tlast = 0;
   }
   void finish(TileOutput& out) {
+    struct Quiet {
+      ~Quiet() { psweep_inputs_changed = true; }
+    } quiet;
     for (;;) {
       low();
       if (!dut_->busy) return;
       collect(out);
       high();
       check_deadline();
+      psweep_inputs_changed = false;  // nothing comes in any more
     }
   }
   void collect(TileOutput& out) {
