@@ -3,7 +3,7 @@
 # Installs the Debian packages of scripts/packages.txt that are missing, and nothing else.
 #
 #   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion,
-#                                                     net, wire, waves
+#                                                     net, wire, waves, plots, cost
 #     --check  install nothing, name what is missing (exit code 1 if anything is)
 #     --list   print the package names
 #
@@ -24,12 +24,19 @@ for arg in "$@"; do
     --check) mode=check ;;
     --list) mode=list ;;
     -h | --help) usage; exit 0 ;;
-    build | lint | formal | gates | opinion | net | wire | waves) groups+=("$arg") ;;
+    build | lint | formal | gates | opinion | net | wire | waves | plots | cost) groups+=("$arg") ;;
     *) die "unknown argument '$arg'; see scripts/setup.sh --help" ;;
   esac
 done
 [ ${#groups[@]} -gt 0 ] || groups=(build)
-[ "${SETUP:-yes}" != no ] || exit 0
+# Group cost has Python packages besides, in a virtual environment.
+finish() {
+  case " ${groups[*]} " in
+    *" cost "*) if [ "$mode" = check ]; then exec scripts/cost/venv.sh --check; else exec scripts/cost/venv.sh; fi ;;
+  esac
+  exit 0
+}
+[ "${SETUP:-yes}" != no ] || finish
 
 packages=()
 declare -A program
@@ -63,7 +70,7 @@ find_missing() {
 }
 
 find_missing
-[ ${#missing[@]} -gt 0 ] || exit 0
+[ ${#missing[@]} -gt 0 ] || finish
 [ "$mode" = install ] || die "missing: ${missing[*]}"
 
 by_hand="As root: apt-get install --no-install-recommends ${missing[*]}"
@@ -106,3 +113,4 @@ SECONDS=0
 find_missing
 [ ${#missing[@]} -eq 0 ] || give_up "apt-get reported success, but packages are still missing"
 say "installed in $SECONDS s"
+finish

@@ -1,0 +1,332 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What one entity costs in one FPGA family: LUT, FF, block RAM, DSP, carry, longest path in LUTs; as a table or JSON.
+
+  scripts/cost/measure.py --entity E --family F [G_X=n ...]
+    --entity E        file rtl/E.vhd; generics that are not given are as by default
+    --config NAME     generics of tb/configs/NAME.json or build/configs/NAME.json; tb/chip/configs/NAME.json for
+                      psweep_top. G_X=n overrides one of them
+    --family F        xc6v, xc5v, ecp5, ng_medium
+    --hierarchy       also module by module: hierarchy is kept at the units of engine and arbiter
+    --no-dsp          multipliers in LUTs
+    --json FILE       everything as JSON ('-': standard output); docs/cost.md says what the fields mean
+    --rtl FOLDER      another folder instead of rtl/ (with its files.f)
+    --no-cache        measure anew
+
+VHDL is converted by GHDL, synthesised by the Yosys of the virtual environment (scripts/setup.sh cost). Debug outputs
+dbg_* are left open. Results are kept in build/cost/cache, by the converted Verilog, tool, family and these scripts: the
+same question again costs a second. From Python: measure(entity, family, generics, hierarchy=False, ..) -> dict.
+Environment: COST_VENV names another virtual environment, COST_CACHE another cache.
+"""
+import argparse
+import functools
+import hashlib
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE))
+
+import families  # noqa: E402  (the folder of this script, whatever the current one is)
+import netlist as netlists  # noqa: E402
+
+SCHEMA = 1
+# Where --hierarchy keeps the hierarchy, as the paper's table 4 does: units of the engine, then of the arbiter.
+ENGINE_UNITS = ("control", "address_generator", "storage", "interpolation", "similarity", "updating")
+CHIP_UNITS = ENGINE_UNITS + ("mac_rx", "async_fifo", "packet_rx", "responder", "counters", "packet_tx", "mac_tx",
+                             "row_buffer", "scheduler", "map_buffer")
+
+
+class CostError(Exception):
+    """Says what to do, without a trace."""
+
+
+def venv():
+    return pathlib.Path(os.environ.get("COST_VENV", ROOT / "build" / "cost" / "venv"))
+
+
+def venv_python():
+    python = venv() / "bin" / "python3"
+    if not python.exists():
+        raise CostError(f"no virtual environment in {venv()}: run scripts/setup.sh cost")
+    return str(python)
+
+
+@functools.lru_cache(maxsize=None)
+def tool_version():
+    run = subprocess.run([venv_python(), str(HERE / "yosys_run.py"), "--version"], capture_output=True, text=True)
+    if run.returncode:
+        raise CostError(f"{venv()} has no pyosys: run scripts/setup.sh cost\n{run.stderr.strip()}")
+    return run.stdout.strip()
+
+
+def all_entities(rtl):
+    lines = [line.split("#")[0].strip() for line in (rtl / "files.f").read_text().splitlines()]
+    return [line for line in lines if line]
+
+
+def generics_of(entity, rtl):
+    """Names of the generics of an entity, with defaults, read from its declaration."""
+    text = re.sub(r"--.*", "", (rtl / f"{entity}.vhd").read_text())
+    block = re.search(rf"entity {entity} is\s*(?:generic\s*\((.*?)\)\s*;\s*)?port", text, re.S | re.I)
+    if not block:
+        raise CostError(f"no entity {entity} in {rtl}/{entity}.vhd")
+    return dict(re.findall(r"(G_\w+)\s*:\s*\w+(?:\s+range[^:;]*)?\s*(?::=\s*([^;\s)]+))?", block[1] or ""))
+
+
+def config_generics(entity, config, rtl):
+    """Generics of a named configuration: key 'pix_bits' is generic G_PIX_W."""
+    spelled = {"pix_bits": "G_PIX_W", "weight_bits": "G_WEIGHT_W", "interp_frac": "G_INTERP_F",
+               "mncc_bits": "G_MNCC_W", "frac_bits": "G_FRAC_W"}
+    known = generics_of(entity, rtl)
+    out = {}
+
+    def take(path):
+        for key, value in json.loads(path.read_text()).items():
+            generic = spelled.get(key, "G_" + key.upper())
+            if generic in known and not isinstance(value, str):
+                out[generic] = int(value)
+
+    if entity == "psweep_top":
+        chip = ROOT / "tb" / "chip" / "configs" / f"{config}.json"
+        if chip.exists():
+            take(ROOT / "tb" / "configs" / f"{json.loads(chip.read_text())['engine']}.json")
+            take(chip)
+            return out
+    for folder in (ROOT / "tb" / "configs", ROOT / "build" / "configs"):
+        if (folder / f"{config}.json").exists():
+            take(folder / f"{config}.json")
+            return out
+    raise CostError(f"no configuration '{config}' in tb/configs or build/configs (make config makes one)")
+
+
+def repair(verilog):
+    """GHDL 2.0 writes a signed product as an unsigned one of sign-extended operands: the value is right, but it takes
+    up to five DSP blocks instead of one. Says that the operands are signed; Yosys then drops the extension."""
+    text, number = re.subn(r"(assign \S+ = )(?!\$signed)(\S+) \* (\S+); // smul", r"\1$signed(\2) * $signed(\3); // smul",
+                           verilog)
+    if "// smul" in text and re.search(r"= [^$;]*\* [^;]*; // smul", text):
+        raise CostError("a signed product of a form that scripts/cost/measure.py does not know")
+    return text, number
+
+
+def name_registers(verilog):
+    """GHDL calls a register n123_q and then assigns it to the signal of the source, whose name Yosys drops: gives the
+    register the name of the signal, so that paths can be named."""
+    def module(match):
+        text = match[0]
+        registers = set(re.findall(r"^  reg (?:\[\d+:0\] )?(n\d+_[oq]);$", text, re.M))
+        wires = set(re.findall(r"^  wire (?:\[\d+:0\] )?(\w+);$", text, re.M))
+        new = {}
+        for signal, register in re.findall(r"^  assign (\w+) = (n\d+_[oq]); // \(signal\)$", text, re.M):
+            if register in registers and signal in wires and register not in new:
+                new[register] = signal
+        if not new:
+            return text
+        taken = set(new.values())
+        text = re.sub(r"^  wire (?:\[\d+:0\] )?(\w+);\n", lambda m: "" if m[1] in taken else m[0], text, flags=re.M)
+        text = re.sub(r"^  assign (\w+) = (n\d+_[oq]); // \(signal\)\n",
+                      lambda m: "" if new.get(m[2]) == m[1] else m[0], text, flags=re.M)
+        # Declared before it is used: registers come last in GHDL's text.
+        lines = [m[0] for m in re.finditer(r"^  reg (?:\[\d+:0\] )?(n\d+_[oq]);\n", text, re.M) if m[1] in new]
+        for line in lines:
+            text = text.replace(line, "", 1)
+        head = re.match(r"module .*?\);\n", text, re.S)
+        text = head[0] + "".join(lines) + text[head.end():]
+        return re.sub(r"\bn\d+_[oq]\b", lambda m: new.get(m[0], m[0]), text)
+    return re.sub(r"^module .*?^endmodule", module, verilog, flags=re.M | re.S)
+
+
+def convert(entity, generics, rtl, work):
+    """VHDL to one Verilog text, by GHDL."""
+    files = all_entities(rtl)
+    if f"{entity}.vhd" not in files:
+        raise CostError(f"{rtl}/files.f has no {entity}.vhd")
+    known = generics_of(entity, rtl)
+    for name in generics:
+        if name not in known:
+            raise CostError(f"{entity} has no generic {name}: " + ", ".join(known))
+    sources = [str(rtl / f) for f in files[:files.index(f"{entity}.vhd") + 1]]
+    (work / "ghdl").mkdir()
+    options = ["--std=93c", f"--workdir={work}/ghdl"]
+
+    def ghdl(*arguments):
+        run = subprocess.run(["ghdl", *arguments], capture_output=True, text=True)
+        if run.returncode:
+            raise CostError(f"ghdl: {entity} {generics}:\n{run.stderr}")
+        return run.stdout
+    ghdl("-a", *options, *sources)
+    verilog = ghdl("--synth", *options, "--no-formal", *[f"-g{k}={v}" for k, v in sorted(generics.items())],
+                   "--out=verilog", entity)
+    verilog, repaired = repair(verilog)
+    return name_registers(verilog), repaired
+
+
+def run_yosys(commands, work):
+    with open(work / "yosys.log", "w") as log:
+        run = subprocess.run([venv_python(), str(HERE / "yosys_run.py")], input="\n".join(commands), text=True,
+                             stdout=log, stderr=subprocess.STDOUT)
+    if run.returncode:
+        tail = "".join((work / "yosys.log").read_text().splitlines(True)[-15:])
+        raise CostError(f"Yosys failed ({run.returncode}):\n{tail}")
+
+
+def script_hash():
+    digest = hashlib.sha256()
+    for name in ("families.py", "netlist.py", "yosys_run.py", "measure.py"):
+        digest.update((HERE / name).read_bytes())
+    return digest.hexdigest()
+
+
+def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=None, cache=True, units=CHIP_UNITS):
+    """Returns a dictionary (docs/cost.md, 'JSON'). Raises CostError."""
+    rtl = pathlib.Path(rtl or ROOT / "rtl").resolve()
+    generics = {k: int(v) for k, v in (generics or {}).items()}
+    if family not in families.FAMILIES:
+        raise CostError(f"unknown family '{family}': " + ", ".join(families.FAMILIES))
+    if not (rtl / f"{entity}.vhd").exists():
+        raise CostError(f"no {rtl}/{entity}.vhd")
+    with tempfile.TemporaryDirectory(prefix="psweep-cost-") as folder:
+        work = pathlib.Path(folder)
+        verilog, repaired = convert(entity, generics, rtl, work)
+        question = [verilog, family, hierarchy, no_dsp, list(units), tool_version(), script_hash()]
+        key = hashlib.sha256(json.dumps(question).encode()).hexdigest()
+        kept = pathlib.Path(os.environ.get("COST_CACHE", ROOT / "build" / "cost" / "cache")) / f"{key}.json"
+        result = None
+        if cache and kept.exists():
+            try:
+                result = json.loads(kept.read_text())
+            except ValueError:
+                result = None
+        fresh = result is None
+        if fresh:
+            (work / "top.v").write_text(verilog)
+            result = synthesise(entity, family, hierarchy, no_dsp, rtl, units, work)
+            result["signed_products_repaired"] = repaired
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=kept.parent)
+            with os.fdopen(handle, "w") as file:
+                json.dump(result, file)
+            os.chmod(name, 0o644)
+            os.replace(name, kept)
+    defaults = {k: int(v) for k, v in generics_of(entity, rtl).items() if re.fullmatch(r"-?\d+", v)}
+    return {"schema": SCHEMA, "entity": entity, "family": family, "generics": {**defaults, **generics},
+            "hierarchy": hierarchy, "no_dsp": no_dsp, "tool": tool_version(), "cached": not fresh, **result}
+
+
+def synthesise(entity, family, hierarchy, no_dsp, rtl, units, work):
+    started = time.time()
+    entities = [f[:-4] for f in all_entities(rtl)]
+    modules = re.findall(r"^module (\S+)", (work / "top.v").read_text(), re.M)
+    rows = [m for m in modules if netlists.entity_of(m, entities) in units and strip_top(m) != entity] \
+        if hierarchy else []
+    read = [f"read_verilog {work}/top.v", f"delete -output {entity}/w:dbg_*"]
+    commands = read + [f"hierarchy -check -top {entity}", "proc", "opt_clean", "memory -nomap",
+                       f"write_json {work}/memories.json", "new design"]
+    commands += read + [f"setattr -mod -set keep_hierarchy 1 {m}" for m in rows]
+    commands += families.commands(family, entity, no_dsp, work) + [f"write_json {work}/netlist.json"]
+    run_yosys(commands, work)
+    found = json.loads((work / "netlist.json").read_text())
+    memories = netlists.memories(json.loads((work / "memories.json").read_text()), entity, units)
+    parts = {}
+
+    def total(module):
+        cells, children = netlists.tally(found, family, module)
+        whole = cells.copy()
+        for child, number in children.items():
+            for cell, count in total(child).items():
+                whole[cell] += number * count
+            parts.setdefault(netlists.entity_of(child, entities), []).extend([child] * number)
+        return whole
+    whole = total(entity)
+    counts = netlists.summary(family, whole)
+    if not counts["lut"] and not counts["ff"] and not any(counts[k] for k in ("ram36", "ram18", "ram48")):
+        raise CostError(f"{entity}: nothing is left of it after synthesis")
+    result = {"counts": counts, "cells": plain(whole), "memories": memories,
+              "memory_bits": sum(m["words"] * m["bits"] for m in memories)}
+    if family != "ecp5" and not hierarchy:
+        best, histogram = netlists.longest(netlists.Levels(family, found["modules"][entity]), units)
+        result["levels"] = {"longest": best.pop(""), "by_unit": dict(sorted(best.items())), "histogram": histogram}
+    if hierarchy:
+        result["units"] = {}
+        rest = netlists.tally(found, family, entity)[0]
+        result["units"][""] = {"instances": 1, "counts": netlists.summary(family, rest),
+                               "cells": plain(rest)}
+        for unit, names in parts.items():
+            cells = sum((netlists.tally(found, family, n)[0] for n in names), netlists.Counter())
+            row = {"instances": len(names), "counts": netlists.summary(family, cells),
+                   "cells": plain(cells)}
+            if family != "ecp5":
+                paths = [netlists.longest(netlists.Levels(family, found["modules"][n]), ())[0][""] for n in set(names)]
+                row["levels"] = max(paths, key=lambda p: (p["lut"], p["carry"]))
+            result["units"][unit] = row
+    result["seconds"] = round(time.time() - started, 1)
+    return result
+
+
+def plain(cells):
+    """Primitives only, sorted."""
+    return {name: number for name, number in sorted(cells.items()) if not name.startswith("$")}
+
+
+def strip_top(module):
+    return netlists.strip(module)
+
+
+def row_text(name, counts):
+    return f"{name:20} " + " ".join(
+        f"{counts[key]:>8g}" for key in ("lut", "ff", "ram36_equivalent", "ram48", "dsp", "carry", "srl", "lutram"))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--entity", default="psweep")
+    parser.add_argument("--family", default="xc6v", choices=families.FAMILIES)
+    parser.add_argument("--config")
+    parser.add_argument("--hierarchy", action="store_true")
+    parser.add_argument("--no-dsp", action="store_true")
+    parser.add_argument("--json")
+    parser.add_argument("--rtl")
+    parser.add_argument("--no-cache", action="store_true")
+    parser.add_argument("generics", nargs="*", metavar="G_X=n")
+    options = parser.parse_args()
+    try:
+        given = {}
+        if options.config:
+            given = config_generics(options.entity, options.config, pathlib.Path(options.rtl or ROOT / "rtl"))
+        for pair in options.generics:
+            if not re.fullmatch(r"G_\w+=-?\d+", pair):
+                raise CostError(f"'{pair}' is not G_X=n")
+            given[pair.split("=")[0]] = int(pair.split("=")[1])
+        result = measure(options.entity, options.family, given, options.hierarchy, options.no_dsp, options.rtl,
+                         not options.no_cache)
+    except CostError as error:
+        sys.exit(f"measure: {error}")
+    if options.json:
+        text = json.dumps(result, indent=1) + "\n"
+        if options.json == "-":
+            sys.stdout.write(text)
+            return
+        pathlib.Path(options.json).parent.mkdir(parents=True, exist_ok=True)
+        pathlib.Path(options.json).write_text(text)
+    print(f"{options.entity} on {options.family}, {result['tool']}"
+          f"{' (kept)' if result['cached'] else ''}, {result['seconds']} s")
+    print(f"{'':20} " + " ".join(f"{t:>8}" for t in
+                                ("LUT", "FF", "RAMB36", "RAMB48", "DSP", "carry", "SRL", "LUTRAM")))
+    for unit, row in sorted(result.get("units", {}).items()):
+        print(row_text(unit or "(between)", row["counts"]))
+    print(row_text("all", result["counts"]))
+    if "levels" in result:
+        path = result["levels"]["longest"]
+        print(f"longest path: {path['lut']} LUTs, {path['carry']} carry cells, {path['start']} -> {path['end']}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Counts cells and walks the longest path of a netlist that Yosys wrote as JSON (write_json)."""
+import re
+from collections import Counter
+
+from families import STYLE, kind, nx_blocks, NX_MODES, NX_MODES_ECC
+
+COUNTED = ("lut", "ff", "ram36", "ram18", "ram48", "rf", "dsp", "alu", "carry", "mux", "srl", "lutram")
+
+
+def strip(name):
+    return name[1:] if name.startswith("\\") else name
+
+
+def entity_of(module, entities):
+    """Entity of a module that GHDL wrote: its name, then its generics (similarity_13_..)."""
+    return max((e for e in entities if re.fullmatch(re.escape(e) + r"(_[0-9a-f]+)*", strip(module))), key=len,
+               default=None)
+
+
+def is_module(netlist, cell):
+    """A cell that is a module of its own, not a primitive."""
+    module = netlist["modules"].get(cell["type"])
+    return module is not None and not int(module.get("attributes", {}).get("blackbox", "0"), 2) \
+        and not int(module.get("attributes", {}).get("whitebox", "0"), 2)
+
+
+def tally(netlist, family, name):
+    """Cells by type and children of one module."""
+    cells, children = Counter(), Counter()
+    for cell in netlist["modules"][name]["cells"].values():
+        if is_module(netlist, cell):
+            children[cell["type"]] += 1
+        else:
+            cells[cell["type"]] += 1
+    return cells, children
+
+
+def summary(family, cells):
+    """Counts of a bag of primitives: see docs/cost.md, 'JSON'. Unknown primitives are an error, not a zero."""
+    out = dict.fromkeys(COUNTED, 0)
+    for cell_type, number in cells.items():
+        if cell_type.startswith("$"):
+            if cell_type in ("$scopeinfo", "$meta"):
+                continue
+            raise ValueError(f"cell {cell_type} was not mapped")
+        found = kind(family, cell_type)
+        if found is None:
+            if cell_type in ("GND", "VCC", "VLO", "VHI"):
+                continue
+            raise ValueError(f"cell {cell_type} is not in scripts/cost/families.py ({family})")
+        name, luts = found
+        if name == "lut":
+            out["lut"] += number * luts
+        else:
+            if name != "buffer":
+                out[name] += number
+            out["lut"] += number * luts
+    out["ram36_equivalent"] = out["ram36"] + out["ram18"] / 2
+    return out
+
+
+class Levels:
+    """Longest path of a flat module: LUTs first, carry cells second. Starts and ends: registers, memories, ports."""
+
+    def __init__(self, family, module):
+        self.style = STYLE[family]
+        self.family = family
+        self.names = self._names(module)
+        self.driver = {}   # bit -> (cell name, port, index)
+        self.cells = module["cells"]
+        for cell_name, cell in self.cells.items():
+            for port, bits in cell["connections"].items():
+                if cell["port_directions"][port] == "output":
+                    for index, bit in enumerate(bits):
+                        self.driver[bit] = (cell_name, port, index)
+        self.outputs = [(name, index, bit) for name, port in module["ports"].items()
+                        if port["direction"] == "output" for index, bit in enumerate(port["bits"])]
+        self.memo = {}
+
+    @staticmethod
+    def _names(module):
+        """A readable name of every net bit: of the source, not Yosys' own, the shortest."""
+        names = {}
+        for name, net in module["netnames"].items():
+            rank = (int(net.get("hide_name", 0)), "$" in name, bool(re.search(r"(^|[._])n\d+(_[oq])?$", name)), len(name))
+            for index, bit in enumerate(net["bits"]):
+                if isinstance(bit, int) and (bit not in names or rank < names[bit][0]):
+                    names[bit] = (rank, f"{name}[{index}]" if len(net["bits"]) > 1 else name)
+        return {bit: name for bit, (_, name) in names.items()}
+
+    def what(self, cell):
+        found = kind(self.family, cell["type"])
+        return found[0] if found else "module"
+
+    def arcs(self, cell, port, index):
+        """Inputs of which this output is a function without a clock, and (LUTs, carries) of the way; None: a start."""
+        what = self.what(cell)
+        pins = cell["connections"]
+        inputs = [p for p in pins if cell["port_directions"][p] == "input"]
+        if what in ("lut", "mux", "buffer"):
+            return [b for p in inputs for b in pins[p]], (1, 0) if what == "lut" else (0, 0)
+        if what == "carry":
+            if self.style == "xilinx":
+                bits = [b for p in ("CI", "CYINIT") for b in pins.get(p, [])]
+                return bits + [b for p in ("S", "DI") for b in pins.get(p, [])[:index + 1]], (0, 1)
+            if self.style == "ecp5":
+                last = 0 if port == "S0" else 1
+                return [b for p in inputs if p == "CIN" or p[-1] <= str(last) for b in pins[p]], (0, 1)
+            last = 4 if port == "CO" else int(port[1])
+            return [b for p in inputs if p == "CI" or int(p[1]) <= last for b in pins[p]], (0, 1)
+        if what == "srl":
+            return None
+        if what == "lutram":
+            clocks = ("WCLK", "WCK", "WE", "WRE", "D", "DI", "DIA", "DIB", "DIC", "DID", "WAD")
+            return [b for p in inputs if p not in clocks for b in pins[p]], (1, 0)
+        if what == "dsp" and self.style == "xilinx":
+            def registers(name):
+                value = cell["parameters"].get(name, "1")
+                return value if isinstance(value, int) else int(re.sub("[^01]", "0", value), 2)
+            if registers("PREG"):
+                return None
+            bits = list(pins.get("C", [])) if not registers("CREG") else []
+            if not registers("MREG"):
+                bits += [b for p, r in (("A", "AREG"), ("B", "BREG")) if not registers(r) for b in pins.get(p, [])]
+            return bits, (0, 0)
+        return None
+
+    def clocked_inputs(self, cell):
+        """(port, bit) where a path ends: data, enables and resets of what has a clock."""
+        what = self.what(cell)
+        if what in ("lut", "mux", "carry", "buffer"):
+            return []
+        return [(p, b) for p, bits in cell["connections"].items() if cell["port_directions"][p] == "input"
+                and (what == "module" or not re.search(r"CLK|^CK|CK$|^C$", p) or p == "C" and what == "dsp")
+                for b in bits]
+
+    def arrival(self, bit):
+        """(LUTs, carries, bit before) of the longest way to a bit."""
+        stack = [bit]
+        while stack:
+            top = stack[-1]
+            if top in self.memo and self.memo[top] != "open":
+                stack.pop()
+                continue
+            source = self.driver.get(top)
+            found = self.arcs(self.cells[source[0]], source[1], source[2]) if source else None
+            if not found or not found[0]:
+                self.memo[top] = (0, 0, None)
+                stack.pop()
+                continue
+            inputs, (luts, carries) = found
+            inputs = [b for b in inputs if isinstance(b, int)]
+            todo = [b for b in inputs if b not in self.memo]
+            if todo:
+                if self.memo.get(top) == "open" and any(self.memo.get(b) == "open" for b in todo):
+                    raise ValueError(f"a loop without a register at {self.name(top)}")
+                self.memo.setdefault(top, "open")
+                for b in todo:
+                    stack.append(b)
+                continue
+            if any(self.memo[b] == "open" for b in inputs):
+                raise ValueError(f"a loop without a register at {self.name(top)}")
+            best = max(((self.memo[b][0], self.memo[b][1], b) for b in inputs), default=(0, 0, None))
+            self.memo[top] = (best[0] + luts, best[1] + carries, best[2])
+            stack.pop()
+        return self.memo[bit]
+
+    def name(self, bit):
+        return self.names.get(bit, str(bit))
+
+    def start_name(self, bit):
+        source = self.driver.get(bit)
+        if source is None:
+            return f"port {self.name(bit)}"
+        cell = self.cells[source[0]]
+        what = self.what(cell)
+        own = self.name(bit) if what in ("ff", "srl") else self.cell_name(source[0])
+        return own if what == "ff" else f"{what} {own}"
+
+    @staticmethod
+    def cell_name(name):
+        """Name of a mapped memory or DSP without what Yosys appended."""
+        return re.sub(r"(\.\d+)+$|_reg.*$", "", re.sub(r"\$.*?(?=u_|$)", "", strip(name)))
+
+    def ends(self):
+        """Every end: (LUTs, carries, start, end)."""
+        for cell_name, cell in self.cells.items():
+            sinks = self.clocked_inputs(cell)
+            if not sinks:
+                continue
+            outputs = [b for p, bits in cell["connections"].items() if cell["port_directions"][p] == "output"
+                       for b in bits if b in self.names]
+            what = self.what(cell)
+            own = self.name(outputs[0]) if outputs and what in ("ff", "srl") else self.cell_name(cell_name)
+            for port, bit in sinks:
+                if isinstance(bit, int):
+                    yield self._end(bit, f"{own if what == 'ff' else what + ' ' + own}/{port}")
+        for name, index, bit in self.outputs:
+            if isinstance(bit, int):
+                yield self._end(bit, f"port {name}[{index}]")
+
+    def _end(self, bit, end):
+        luts, carries, before = self.arrival(bit)
+        first = bit
+        while before is not None:
+            first, before = before, self.memo[before][2]
+        return luts, carries, self.start_name(first), end
+
+
+def owner(path_end, entities):
+    """Entity in which an end of a path lies, by the instance names u_<entity> of the source; '' for the top."""
+    found = re.findall(r"u_([a-z0-9_]+?)(?=[.\[/ ]|_u_|$)", path_end)
+    return next((e for e in found if e in entities), "")
+
+
+def longest(levels, entities):
+    """Longest path of all and of each entity (of its end), with the histogram of LUTs."""
+    best, histogram = {}, Counter()
+    for luts, carries, start, end in levels.ends():
+        histogram[luts] += 1
+        for key in {"", owner(end, entities)}:
+            if key not in best or (luts, carries) > (best[key]["lut"], best[key]["carry"]):
+                best[key] = {"lut": luts, "carry": carries, "start": start, "end": end}
+    return best, dict(sorted(histogram.items()))
+
+
+def memories(netlist, top, entities):
+    """Memories before mapping (cells $mem_v2): a list of {entity, name, words, bits, reads, writes}."""
+    found = []
+
+    def walk(module, path):
+        for name, cell in netlist["modules"][module]["cells"].items():
+            if cell["type"] in ("$mem_v2", "$mem"):
+                def number(key):
+                    value = cell["parameters"][key]
+                    return value if isinstance(value, int) else int(value, 2)
+                found.append({"path": ".".join(path), "words": number("SIZE"), "bits": number("WIDTH"),
+                              "reads": number("RD_PORTS"), "writes": number("WR_PORTS")})
+            elif is_module(netlist, cell):
+                walk(cell["type"], path + [strip(name)])
+    walk(top, [])
+    for memory in found:
+        memory["entity"] = next((e for part in memory["path"].split(".")
+                                 for e in [owner(part, entities)] if e), "")
+        memory["nx_ram48"] = nx_blocks(memory["words"], memory["bits"], NX_MODES)
+        memory["nx_ram48_ecc"] = nx_blocks(memory["words"], memory["bits"], NX_MODES_ECC)
+    return sorted(found, key=lambda m: m["path"])
