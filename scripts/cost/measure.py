@@ -4,6 +4,7 @@
 
   scripts/cost/measure.py --entity E --family F [G_X=n ...]
     --entity E        file rtl/E.vhd; generics that are not given are as by default
+    --unit U          of all that, only unit U (similarity, ..) with the generics that it has there
     --config NAME     generics of tb/configs/NAME.json or build/configs/NAME.json; tb/chip/configs/NAME.json for
                       psweep_top. G_X=n overrides one of them
     --family F        xc6v, xc5v, ecp5, ng_medium
@@ -110,8 +111,8 @@ def config_generics(entity, config, rtl):
 def repair(verilog):
     """GHDL 2.0 writes a signed product as an unsigned one of sign-extended operands: the value is right, but it takes
     up to five DSP blocks instead of one. Says that the operands are signed; Yosys then drops the extension."""
-    text, number = re.subn(r"(assign \S+ = )(?!\$signed)(\S+) \* (\S+); // smul", r"\1$signed(\2) * $signed(\3); // smul",
-                           verilog)
+    text, number = re.subn(r"(assign \S+ = )(?!\$signed)(\S+) \* (\S+); // smul",
+                           r"\1$signed(\2) * $signed(\3); // smul", verilog)
     if "// smul" in text and re.search(r"= [^$;]*\* [^;]*; // smul", text):
         raise CostError("a signed product of a form that scripts/cost/measure.py does not know")
     return text, number
@@ -178,6 +179,18 @@ def run_yosys(commands, work):
         raise CostError(f"Yosys failed ({run.returncode}):\n{tail}")
 
 
+def take_unit(verilog, unit, entities):
+    """(text, name) of the module of this unit, with those that it instantiates."""
+    modules = {m[1]: m[0] for m in re.finditer(r"^module (\S+).*?^endmodule\n", verilog, re.M | re.S)}
+    found = [m for m in modules if netlists.entity_of(m, entities) == unit]
+    if not found:
+        raise CostError(f"there is no {unit} in it")
+    wanted = [found[0]]
+    for name in wanted:
+        wanted += [m for m in modules if m not in wanted and re.search(rf"^  {re.escape(m)} ", modules[name], re.M)]
+    return "".join(text for name, text in modules.items() if name in wanted), found[0]
+
+
 def script_hash():
     digest = hashlib.sha256()
     for name in ("families.py", "netlist.py", "yosys_run.py", "measure.py"):
@@ -185,7 +198,8 @@ def script_hash():
     return digest.hexdigest()
 
 
-def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=None, cache=True, units=CHIP_UNITS):
+def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=None, cache=True, units=CHIP_UNITS,
+            unit=None):
     """Returns a dictionary (docs/cost.md, 'JSON'). Raises CostError."""
     rtl = pathlib.Path(rtl or ROOT / "rtl").resolve()
     generics = {k: int(v) for k, v in (generics or {}).items()}
@@ -196,7 +210,10 @@ def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=No
     with tempfile.TemporaryDirectory(prefix="psweep-cost-") as folder:
         work = pathlib.Path(folder)
         verilog, repaired = convert(entity, generics, rtl, work)
-        question = [verilog, family, hierarchy, no_dsp, list(units), tool_version(), script_hash()]
+        top = entity
+        if unit:
+            verilog, top = take_unit(verilog, unit, [f[:-4] for f in all_entities(rtl)])
+        question = [verilog, top, family, hierarchy, no_dsp, list(units), tool_version(), script_hash()]
         key = hashlib.sha256(json.dumps(question).encode()).hexdigest()
         kept = pathlib.Path(os.environ.get("COST_CACHE", ROOT / "build" / "cost" / "cache")) / f"{key}.json"
         result = None
@@ -208,7 +225,7 @@ def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=No
         fresh = result is None
         if fresh:
             (work / "top.v").write_text(verilog)
-            result = synthesise(entity, family, hierarchy, no_dsp, rtl, units, work)
+            result = synthesise(top, family, hierarchy, no_dsp, rtl, units, work)
             result["signed_products_repaired"] = repaired
             kept.parent.mkdir(parents=True, exist_ok=True)
             handle, name = tempfile.mkstemp(dir=kept.parent)
@@ -217,24 +234,24 @@ def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=No
             os.chmod(name, 0o644)
             os.replace(name, kept)
     defaults = {k: int(v) for k, v in generics_of(entity, rtl).items() if re.fullmatch(r"-?\d+", v)}
-    return {"schema": SCHEMA, "entity": entity, "family": family, "generics": {**defaults, **generics},
+    return {"schema": SCHEMA, "entity": entity, "unit": unit, "family": family, "generics": {**defaults, **generics},
             "hierarchy": hierarchy, "no_dsp": no_dsp, "tool": tool_version(), "cached": not fresh, **result}
 
 
-def synthesise(entity, family, hierarchy, no_dsp, rtl, units, work):
+def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     started = time.time()
     entities = [f[:-4] for f in all_entities(rtl)]
     modules = re.findall(r"^module (\S+)", (work / "top.v").read_text(), re.M)
-    rows = [m for m in modules if netlists.entity_of(m, entities) in units and strip_top(m) != entity] \
+    rows = [m for m in modules if netlists.entity_of(m, entities) in units and strip_top(m) != top] \
         if hierarchy else []
-    read = [f"read_verilog {work}/top.v", f"delete -output {entity}/w:dbg_*"]
-    commands = read + [f"hierarchy -check -top {entity}", "proc", "opt_clean", "memory -nomap",
+    read = [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
+    commands = read + [f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap",
                        f"write_json {work}/memories.json", "new design"]
     commands += read + [f"setattr -mod -set keep_hierarchy 1 {m}" for m in rows]
-    commands += families.commands(family, entity, no_dsp, work) + [f"write_json {work}/netlist.json"]
+    commands += families.commands(family, top, no_dsp, work) + [f"write_json {work}/netlist.json"]
     run_yosys(commands, work)
     found = json.loads((work / "netlist.json").read_text())
-    memories = netlists.memories(json.loads((work / "memories.json").read_text()), entity, units)
+    memories = netlists.memories(json.loads((work / "memories.json").read_text()), top, units)
     parts = {}
 
     def total(module):
@@ -245,18 +262,18 @@ def synthesise(entity, family, hierarchy, no_dsp, rtl, units, work):
                 whole[cell] += number * count
             parts.setdefault(netlists.entity_of(child, entities), []).extend([child] * number)
         return whole
-    whole = total(entity)
+    whole = total(top)
     counts = netlists.summary(family, whole)
     if not counts["lut"] and not counts["ff"] and not any(counts[k] for k in ("ram36", "ram18", "ram48")):
-        raise CostError(f"{entity}: nothing is left of it after synthesis")
+        raise CostError(f"{top}: nothing is left of it after synthesis")
     result = {"counts": counts, "cells": plain(whole), "memories": memories,
               "memory_bits": sum(m["words"] * m["bits"] for m in memories)}
     if family != "ecp5" and not hierarchy:
-        best, histogram = netlists.longest(netlists.Levels(family, found["modules"][entity]), units)
+        best, histogram = netlists.longest(netlists.Levels(family, found["modules"][top]), units)
         result["levels"] = {"longest": best.pop(""), "by_unit": dict(sorted(best.items())), "histogram": histogram}
     if hierarchy:
         result["units"] = {}
-        rest = netlists.tally(found, family, entity)[0]
+        rest = netlists.tally(found, family, top)[0]
         result["units"][""] = {"instances": 1, "counts": netlists.summary(family, rest),
                                "cells": plain(rest)}
         for unit, names in parts.items():
@@ -289,6 +306,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--entity", default="psweep")
     parser.add_argument("--family", default="xc6v", choices=families.FAMILIES)
+    parser.add_argument("--unit")
     parser.add_argument("--config")
     parser.add_argument("--hierarchy", action="store_true")
     parser.add_argument("--no-dsp", action="store_true")
@@ -306,7 +324,7 @@ def main():
                 raise CostError(f"'{pair}' is not G_X=n")
             given[pair.split("=")[0]] = int(pair.split("=")[1])
         result = measure(options.entity, options.family, given, options.hierarchy, options.no_dsp, options.rtl,
-                         not options.no_cache)
+                         not options.no_cache, unit=options.unit)
     except CostError as error:
         sys.exit(f"measure: {error}")
     if options.json:
@@ -316,7 +334,7 @@ def main():
             return
         pathlib.Path(options.json).parent.mkdir(parents=True, exist_ok=True)
         pathlib.Path(options.json).write_text(text)
-    print(f"{options.entity} on {options.family}, {result['tool']}"
+    print(f"{options.unit or options.entity} on {options.family}, {result['tool']}"
           f"{' (kept)' if result['cached'] else ''}, {result['seconds']} s")
     print(f"{'':20} " + " ".join(f"{t:>8}" for t in
                                 ("LUT", "FF", "RAMB36", "RAMB48", "DSP", "carry", "SRL", "LUTRAM")))

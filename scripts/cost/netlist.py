@@ -83,7 +83,8 @@ class Levels:
         """A readable name of every net bit: of the source, not Yosys' own, the shortest."""
         names = {}
         for name, net in module["netnames"].items():
-            rank = (int(net.get("hide_name", 0)), "$" in name, bool(re.search(r"(^|[._])n\d+(_[oq])?$", name)), len(name))
+            rank = (int(net.get("hide_name", 0)), "$" in name, "NX_" in name,
+                    bool(re.search(r"(^|[._])n\d+(_[oq])?$", name)), len(name))
             for index, bit in enumerate(net["bits"]):
                 if isinstance(bit, int) and (bit not in names or rank < names[bit][0]):
                     names[bit] = (rank, f"{name}[{index}]" if len(net["bits"]) > 1 else name)

@@ -35,7 +35,7 @@ if ! python3 -m venv "$venv" > "$log" 2>&1; then
 fi
 if ! "$venv/bin/python3" -m pip install -q --disable-pip-version-check -r "$wanted" > "$log" 2>&1; then
   tail -n 5 "$log" >&2
-  say "pip could not install $wanted. It needs the Python Package Index once: where it is reached through a proxy or" >&2
+  say "pip could not install $wanted. It needs the Python Package Index once; behind a proxy or" >&2
   say "with a certificate of one's own, set https_proxy, PIP_CERT or pip's configuration and run it again." >&2
   rm -rf "$venv"
   exit 1
