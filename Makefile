@@ -74,9 +74,26 @@ sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recor
 	@scripts/sim_gates.sh
 
 .PHONY: cost
-cost: ## LUT, FF, block RAM, DSP of the engine by Yosys for Virtex-6 (minutes); scripts/cost.sh ENTITY: of one entity
-	@scripts/setup.sh build gates
-	@scripts/cost.sh
+cost: setup ## LUT, FF, RAM, DSP of the engines beside the paper's, by Yosys (4 minutes)   CFG=tile FAMILY=xc6v,.. ALL=1
+	@scripts/setup.sh cost
+	@scripts/build.sh shape_table
+	@scripts/cost/report.py $(if $(CFG),--config $(CFG)) $(if $(ALL),--all) $(if $(FAMILY),--family $(FAMILY))
+
+.PHONY: cost-check
+cost-check: setup ## All counts again (10 minutes): are they those of docs/cost.md? Growth fails
+	@scripts/setup.sh cost
+	@scripts/cost/report.py --check
+
+.PHONY: cost-update
+cost-update: setup ## All counts again into scripts/cost/baseline.json, docs/cost.md, docs/datasheet.md, the picture
+	@scripts/setup.sh cost
+	@scripts/build.sh shape_table
+	@scripts/cost/report.py --update
+
+.PHONY: pnr
+pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (10 minutes)   CFG=tile SEEDS=1,2,3
+	@scripts/setup.sh build cost
+	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS))
 
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/

@@ -22,6 +22,7 @@ Environment: COST_VENV names another virtual environment, COST_CACHE another cac
 import argparse
 import functools
 import hashlib
+import inspect
 import json
 import os
 import pathlib
@@ -193,8 +194,9 @@ def take_unit(verilog, unit, entities):
 
 def script_hash():
     digest = hashlib.sha256()
-    for name in ("families.py", "netlist.py", "yosys_run.py", "measure.py"):
+    for name in ("families.py", "netlist.py", "yosys_run.py"):
         digest.update((HERE / name).read_bytes())
+    digest.update(inspect.getsource(synthesise).encode())
     return digest.hexdigest()
 
 
@@ -245,13 +247,13 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     rows = [m for m in modules if netlists.entity_of(m, entities) in units and strip_top(m) != top] \
         if hierarchy else []
     read = [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
-    commands = read + [f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap",
+    commands = read + [f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap", "wreduce t:$mul", "opt_clean",
                        f"write_json {work}/memories.json", "new design"]
     commands += read + [f"setattr -mod -set keep_hierarchy 1 {m}" for m in rows]
     commands += families.commands(family, top, no_dsp, work) + [f"write_json {work}/netlist.json"]
     run_yosys(commands, work)
     found = json.loads((work / "netlist.json").read_text())
-    memories = netlists.memories(json.loads((work / "memories.json").read_text()), top, units)
+    memories, products = netlists.memories(json.loads((work / "memories.json").read_text()), top, units)
     parts = {}
 
     def total(module):
@@ -266,7 +268,7 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     counts = netlists.summary(family, whole)
     if not counts["lut"] and not counts["ff"] and not any(counts[k] for k in ("ram36", "ram18", "ram48")):
         raise CostError(f"{top}: nothing is left of it after synthesis")
-    result = {"counts": counts, "cells": plain(whole), "memories": memories,
+    result = {"counts": counts, "cells": plain(whole), "memories": memories, "products": products,
               "memory_bits": sum(m["words"] * m["bits"] for m in memories)}
     if family != "ecp5" and not hierarchy:
         best, histogram = netlists.longest(netlists.Levels(family, found["modules"][top]), units)

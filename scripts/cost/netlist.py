@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 
-from families import STYLE, kind, nx_blocks, NX_MODES, NX_MODES_ECC
+from families import NX_MODES_ECC, STYLE, kind, nx_blocks
 
 COUNTED = ("lut", "ff", "ram36", "ram18", "ram48", "rf", "dsp", "alu", "carry", "mux", "srl", "lutram")
 
@@ -176,7 +176,7 @@ class Levels:
             return f"port {self.name(bit)}"
         cell = self.cells[source[0]]
         what = self.what(cell)
-        own = self.name(bit) if what in ("ff", "srl") else self.cell_name(source[0])
+        own = self.name(bit) if what in ("ff", "srl") else self.cell_name(source[0]) or self.name(bit)
         return own if what == "ff" else f"{what} {own}"
 
     @staticmethod
@@ -193,7 +193,8 @@ class Levels:
             outputs = [b for p, bits in cell["connections"].items() if cell["port_directions"][p] == "output"
                        for b in bits if b in self.names]
             what = self.what(cell)
-            own = self.name(outputs[0]) if outputs and what in ("ff", "srl") else self.cell_name(cell_name)
+            own = self.name(outputs[0]) if outputs and what in ("ff", "srl") else \
+                self.cell_name(cell_name) or (self.name(outputs[0]) if outputs else "")
             for port, bit in sinks:
                 if isinstance(bit, int):
                     yield self._end(bit, f"{own if what == 'ff' else what + ' ' + own}/{port}")
@@ -226,24 +227,25 @@ def longest(levels, entities):
     return best, dict(sorted(histogram.items()))
 
 
-def memories(netlist, top, entities):
-    """Memories before mapping (cells $mem_v2): a list of {entity, name, words, bits, reads, writes}."""
-    found = []
+def memories(netlist, top, units):
+    """Memories and products before mapping (cells $mem_v2, $mul), each with the unit in which it lies."""
+    rams, products = [], []
 
-    def walk(module, path):
+    def number(cell, key):
+        value = cell["parameters"][key]
+        return value if isinstance(value, int) else int(value, 2)
+
+    def walk(module, path, unit):
         for name, cell in netlist["modules"][module]["cells"].items():
             if cell["type"] in ("$mem_v2", "$mem"):
-                def number(key):
-                    value = cell["parameters"][key]
-                    return value if isinstance(value, int) else int(value, 2)
-                found.append({"path": ".".join(path), "words": number("SIZE"), "bits": number("WIDTH"),
-                              "reads": number("RD_PORTS"), "writes": number("WR_PORTS")})
+                words, bits = number(cell, "SIZE"), number(cell, "WIDTH")
+                rams.append({"path": ".".join(path), "unit": unit, "words": words, "bits": bits,
+                             "reads": number(cell, "RD_PORTS"), "writes": number(cell, "WR_PORTS"),
+                             "nx_ram48": nx_blocks(words, bits), "nx_ram48_ecc": nx_blocks(words, bits, NX_MODES_ECC)})
+            elif cell["type"] == "$mul":
+                products.append({"unit": unit, "a": number(cell, "A_WIDTH"), "b": number(cell, "B_WIDTH"),
+                                 "result": number(cell, "Y_WIDTH"), "signed": bool(number(cell, "A_SIGNED"))})
             elif is_module(netlist, cell):
-                walk(cell["type"], path + [strip(name)])
-    walk(top, [])
-    for memory in found:
-        memory["entity"] = next((e for part in memory["path"].split(".")
-                                 for e in [owner(part, entities)] if e), "")
-        memory["nx_ram48"] = nx_blocks(memory["words"], memory["bits"], NX_MODES)
-        memory["nx_ram48_ecc"] = nx_blocks(memory["words"], memory["bits"], NX_MODES_ECC)
-    return sorted(found, key=lambda m: m["path"])
+                walk(cell["type"], path + [strip(name)], entity_of(cell["type"], units) or unit)
+    walk(top, [], entity_of(top, units) or "")
+    return sorted(rams, key=lambda m: m["path"]), sorted(products, key=lambda m: (m["unit"], m["a"], m["b"]))

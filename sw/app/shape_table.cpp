@@ -5,6 +5,9 @@
 // generics.
 //   shape_table            Markdown tables of docs/tiles.md
 //   shape_table --curve    the points of the picture: kind, Mbit, million clocks of 1, 2 and 4 lanes, columns, rows
+//   shape_table --tile C R [PIXELS PLANES]
+//                          one shape as JSON, of PIXELS x PIXELS pixels (1120) and PLANES planes (301): clocks of the
+//                          plan, useful ones, image buffer (scripts/cost/report.py)
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -182,16 +185,33 @@ int run(bool curve) {
   return 0;
 }
 
+int run_tile(const std::vector<std::string>& numbers) {
+  golden::Config c;
+  if (numbers.size() == 4) c.planes = std::stoi(numbers[3]);
+  const int pixels = numbers.size() == 4 ? std::stoi(numbers[2]) : 1120;
+  const SweepSetup setup{rover_rig(pixels), {c.planes, 1.0, 4.0}, c, threshold_for(c, 0.85)};
+  const Shape s = shape_of(setup, {std::stoi(numbers[0]), std::stoi(numbers[1])});
+  std::printf(
+      "{\"tile\": [%d, %d], \"pixels\": %d, \"planes\": %d, \"tiles\": %zu, \"buffer\": [%d, %d], \"useful\": %llu, "
+      "\"clocks\": {\"1\": %llu, \"2\": %llu, \"4\": %llu}}\n",
+      s.size.cols, s.size.rows, pixels, c.planes, s.tiles, s.config.img_cols, s.config.img_rows,
+      static_cast<unsigned long long>(s.useful), static_cast<unsigned long long>(s.all[0]),
+      static_cast<unsigned long long>(s.all[1]), static_cast<unsigned long long>(s.all[2]));
+  return 0;
+}
+
 }  // namespace
 }  // namespace psweep
 
 int main(int argc, char** argv) {
   const std::string option = argc > 1 ? argv[1] : "";
-  if (argc > 2 || (argc == 2 && option != "--curve")) {
-    std::fprintf(stderr, "usage: shape_table [--curve]\n");
+  const bool tile = option == "--tile" && (argc == 4 || argc == 6);
+  if (!tile && (argc > 2 || (argc == 2 && option != "--curve"))) {
+    std::fprintf(stderr, "usage: shape_table [--curve | --tile COLS ROWS [PIXELS PLANES]]\n");
     return 2;
   }
   try {
+    if (tile) return psweep::run_tile(std::vector<std::string>(argv + 2, argv + argc));
     return psweep::run(option == "--curve");
   } catch (const std::exception& e) {
     std::fprintf(stderr, "shape_table: %s\n", e.what());

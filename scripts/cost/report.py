@@ -1,0 +1,569 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of what the engine costs: per unit beside the paper's, and whole, by Yosys, in four families (make cost).
+
+  scripts/cost/report.py                     the engines of the datasheet on Virtex-6 (some minutes)
+  scripts/cost/report.py --all               every configuration and family of scripts/cost/points.py
+  scripts/cost/report.py --config NAME ..    these: a name of points.py, tb/configs or build/configs (make config)
+    --family F,..      in these families: xc6v, xc5v, ecp5, ng_medium (default xc6v)
+  scripts/cost/report.py --check [--quick]   measures anew and compares with scripts/cost/baseline.json; growth fails
+  scripts/cost/report.py --update            measures all and writes baseline.json, the tables of docs/cost.md and
+                                             docs/datasheet.md, docs/images/cost.svg
+  scripts/cost/report.py --pages [--check]   only writes (compares) the pages from baseline.json
+  scripts/cost/report.py --pnr               place and route into baseline.json and the pages (half an hour)
+
+Everything is written to build/cost/ as JSON (fields: docs/cost.md), with the plot cost.svg. JOBS: measurements at once.
+"""
+import argparse
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+
+import families  # noqa: E402
+import measure as cost  # noqa: E402
+import pnr  # noqa: E402
+from points import (BITS, NG_MEDIUM, PAPER_ALL, PAPER_CLOCKS, PAPER_UNITS, PEERS, POINTS, SHIPPED,  # noqa: E402
+                    V5QV)
+
+OUT = cost.ROOT / "build" / "cost"
+BASELINE = cost.HERE / "baseline.json"
+PAGES = (cost.ROOT / "docs" / "cost.md", cost.ROOT / "docs" / "datasheet.md")
+PICTURE = cost.ROOT / "docs" / "images" / "cost.svg"
+FAMILY_NAMES = {"xc6v": "Virtex-6", "xc5v": "Virtex-5", "ecp5": "ECP5", "ng_medium": "NG-MEDIUM"}
+# The same RTL gives the same counts with the same tools; another GHDL writes other Verilog for the same circuit, and
+# renaming a signal changes the order in which ABC sees it. So this much is not called growth: a share and a few more.
+# RAM and DSP do not wander.
+TOLERANCE = {"lut": (0.015, 4), "ff": (0.01, 4), "carry": (0.03, 4), "ram36_equivalent": (0, 0), "ram48": (0, 0),
+             "dsp": (0, 0)}
+_print = threading.Lock()
+
+
+def say(text):
+    with _print:
+        print(f"cost: {text}", file=sys.stderr, flush=True)
+
+
+def measure_point(name, point, family, hierarchy, rtl=None):
+    entity = point.get("entity", "psweep")
+    generics = {}
+    if "config" in point:
+        generics = cost.config_generics(entity, point["config"], pathlib.Path(rtl or cost.ROOT / "rtl"))
+    generics.update(point.get("generics", {}))
+    result = cost.measure(entity, family, generics, hierarchy, point.get("no_dsp", False), rtl, unit=point.get("unit"))
+    kind = "units" if hierarchy else "flat"
+    took = "kept" if result["cached"] else f"{result['seconds']} s"
+    say(f"{name}, {family}, {kind}: {result['counts']['lut']} LUT ({took})")
+    OUT.mkdir(parents=True, exist_ok=True)
+    (OUT / f"{name}-{family}-{kind}.json").write_text(json.dumps(result, indent=1) + "\n")
+    return result
+
+
+def run(questions, rtl=None):
+    """{(point, family, hierarchy): result} of a list of such keys, several at once."""
+    jobs = int(os.environ.get("JOBS") or os.cpu_count() or 1)
+    with ThreadPoolExecutor(jobs) as pool:
+        futures = {q: pool.submit(measure_point, q[0], POINTS[q[0]], q[1], q[2], rtl) for q in questions}
+        return {q: f.result() for q, f in futures.items()}
+
+
+def short(result):
+    """What the baseline keeps of a result."""
+    out = {"counts": result["counts"], "generics": result["generics"], "cells": result["cells"]}
+    if "levels" in result:
+        out["levels"] = {"longest": result["levels"]["longest"], "by_unit": result["levels"]["by_unit"]}
+    if "units" in result:
+        out["units"] = {u: {k: row[k] for k in ("counts", "cells", "levels", "instances") if k in row}
+                        for u, row in result["units"].items()}
+    if result["family"] == "ng_medium" and "units" not in result:
+        out["memories"] = result["memories"]
+    return out
+
+
+def clocks_of(name):
+    """Clocks of the frame of a point, by the planner: shape_table of the build."""
+    point = POINTS[name]
+    if not point.get("tile"):
+        return None
+    program = next((p for p in (cost.ROOT / "build" / "shape_table", pathlib.Path(os.environ.get("SHAPE_TABLE", "/")))
+                    if p.is_file()), None)
+    if program is None:
+        raise cost.CostError("no build/shape_table: run scripts/build.sh shape_table (make cost does)")
+    numbers = [str(n) for n in point["tile"]]
+    if "pixels" in point:
+        numbers += [str(point["pixels"]), str(point["planes"])]
+    run_ = subprocess.run([str(program), "--tile", *numbers], capture_output=True, text=True)
+    if run_.returncode:
+        raise cost.CostError(run_.stderr)
+    plan = json.loads(run_.stdout)
+    lanes = point.get("generics", {}).get("G_LANES", 1)
+    return {"clocks": plan["clocks"][str(lanes)], "useful": plan["useful"], "pixels": plan["pixels"],
+            "planes": plan["planes"], "tiles": plan["tiles"], "lanes": lanes}
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------------
+
+def num(value):
+    return f"{value:g}"
+
+
+def markdown(head, rows):
+    return "\n".join(["| " + " | ".join(head) + " |", "|" + "---|" * len(head)] +
+                     ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
+
+
+def flat(base, name, family="xc6v"):
+    return base["points"].get(name, {}).get(family, {}).get("flat")
+
+
+def efficiency(frame, lut):
+    return frame["useful"] / frame["clocks"] / (lut / 1000)
+
+
+def mega(clocks):
+    return f"{clocks / 1e6:.1f}"
+
+
+def table_engines(base):
+    rows = []
+    paper = ["**the paper, 44-30-13-13, ISE 14.7**", *PAPER_ALL, "about 515",
+             f"{base['frames']['bands']['useful'] / PAPER_CLOCKS / PAPER_ALL[0] * 1000:.2f}"]
+    for name, point in POINTS.items():
+        found = flat(base, name)
+        if not found or name in [f"{g}_{v}" for g, vs in BITS.items() for v in vs] or "unit" in point:
+            continue
+        c, frame = found["counts"], base["frames"].get(name)
+        title = point["title"] + ("; the paper's arbiter: 3K LUT, 55 RAMB36" if name == "arbiter_double" else "") + \
+            ("; the paper: 12.6K LUT" if point.get("no_dsp") else "")
+        rows.append([title, c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"], mega(frame["clocks"]) if frame else "",
+                     f"{efficiency(frame, c['lut']):.2f}" if frame and point.get("entity") is None else ""])
+        if name == "bands":
+            rows.append(paper)
+    return markdown(["xc6v", "LUT", "FF", "RAMB36", "DSP48E1", "M clocks", "efficiency"], rows)
+
+
+def table_units(base, family="xc6v"):
+    found = base["points"]["bands"][family]["units"]
+    head = ["44-30-13-13", "LUT", "paper", "FF", "paper", "RAMB36", "paper", "DSP", "paper"]
+    rows = []
+    for unit, paper in PAPER_UNITS.items():
+        c = found["units"][unit]["counts"]
+        ours = (c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"])
+        rows.append([unit] + [x for pair in zip(ours, paper) for x in pair])
+    rest = found["units"][""]["counts"]
+    rows.append(["between them", rest["lut"], "", rest["ff"], "", num(rest["ram36_equivalent"]), "", rest["dsp"], ""])
+    for title, c in (("all, hierarchy kept", found["counts"]), ("**all, flat**", flat(base, "bands", family)["counts"])):
+        ours = (c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"])
+        rows.append([title] + [x for pair in zip(ours, PAPER_ALL) for x in pair])
+    return markdown(head, rows)
+
+
+def table_cells(base):
+    found = base["points"]["bands"]["xc6v"]["units"]["units"]
+    kinds = ["INV"] + [f"LUT{n}" for n in range(2, 7)]
+    rows = []
+    for unit in [*PAPER_UNITS, ""]:
+        cells, c = found[unit]["cells"], found[unit]["counts"]
+        rows.append([unit or "between them"] + [cells.get(k, 0) for k in kinds] +
+                    [c["srl"], c["lutram"], c["carry"], c["mux"], c["ram36"], c["ram18"]])
+    return markdown(["xc6v, bands", *kinds, "SRL", "LUT RAM", "CARRY4", "MUXF", "RAMB36E1", "RAMB18E1"], rows)
+
+
+def nx_rows(memories):
+    """Blocks of memories that are no register files."""
+    blocks = [m for m in memories if m["words"] > 64]
+    return sum(m["nx_ram48"] for m in blocks), sum(m["nx_ram48_ecc"] for m in blocks)
+
+
+def table_families(base):
+    rows = []
+    for name, point in POINTS.items():
+        for family in families.FAMILIES:
+            found = flat(base, name, family)
+            if not found or family == "xc6v" and len(base["points"][name]) == 1 or name.startswith("G_"):
+                continue
+            c = found["counts"]
+            ram = num(c["ram36_equivalent"]) + " RAMB36"
+            if family == "ng_medium":
+                ram = f"{c['ram48']} RAMB48 ({nx_rows(found['memories'])[0]} by modes)"
+            if family == "ecp5":
+                ram = f"{c['ram18']} DP16KD"
+            rows.append([point["title"], FAMILY_NAMES[family], c["lut"], c["ff"], ram, c["dsp"], c["carry"],
+                         c["srl"] or "", c["lutram"] or c["rf"] or ""])
+    return markdown(["", "family", "LUT", "FF", "RAM", "DSP", "carry", "SRL", "LUT RAM or RF"], rows)
+
+
+def table_levels(base):
+    rows = []
+    for family in ("xc6v", "xc5v"):
+        found = flat(base, "bands", family)["levels"]["by_unit"]
+        for unit in PAPER_UNITS:
+            path = found[unit]
+            rows.append([f"{unit}", family, f"**{path['lut']}**" if path["lut"] > 5 else path["lut"], path["carry"],
+                         f"`{tidy(path['start'])}`", f"`{tidy(path['end'])}`"])
+    return markdown(["unit of the end", "family", "LUTs", "carry", "from", "to"], rows)
+
+
+def tidy(name):
+    return re.sub(r"^(ram36|ram18|srl|dsp|lutram) ", r"\1: ", name.replace("g_address_n1_u_", "").replace(
+        "g_similarity_n1_u_", ""))
+
+
+def table_five(base):
+    rows = [[who, ram, pds, eff, "", source] for who, ram, pds, eff, source in PEERS]
+    for name in ("bands", "tile", "tile_2", "tile_4", "mbit", "integer"):
+        c, frame = flat(base, name)["counts"], base["frames"][name]
+        seconds = frame["clocks"] / 300e6
+        pds = frame["pixels"] ** 2 * frame["planes"] / seconds
+        rows.append([f"ours: {POINTS[name]['title']}", f"{num(c['ram36_equivalent'])} / {c['lut'] / 1000:.1f}K",
+                     f"{pds / 1e6:,.0f} M", f"{pds / c['lut'] / 1000:.0f}K", f"{1 / seconds:.2f}", "this page"])
+    return markdown(["", "RAMB36 / LUT", "PDS", "PDS / LUT", "frames a second", "source"], rows)
+
+
+def table_bits(base):
+    start = flat(base, "tile")["counts"]
+    rows = []
+    for generic, values in BITS.items():
+        for value in values:
+            c = start if value == SHIPPED[generic] else flat(base, f"{generic}_{value}")["counts"]
+            rows.append([generic, f"**{value}**" if value == SHIPPED[generic] else value, c["lut"], c["ff"],
+                         num(c["ram36_equivalent"]), c["dsp"], f"{c['lut'] - start['lut']:+d}",
+                         f"{c['ff'] - start['ff']:+d}"])
+    return markdown(["`tile`, xc6v", "bits", "LUT", "FF", "RAMB36", "DSP", "LUT more", "FF more"], rows)
+
+
+def table_nx_rams(base):
+    rows, groups = [], {}
+    for m in flat(base, "chip_ng", "ng_medium")["memories"]:
+        groups.setdefault((m["unit"], re.sub(r"_?\d+$", "", m["path"].split(".")[-1].split("_u_")[-1].removeprefix("u_")),
+                           m["words"], m["bits"], m["reads"]), []).append(m)
+    for (unit, name, words, bits, reads), ms in groups.items():
+        small = words <= 64
+        rows.append([unit or "arbiter", name, len(ms), f"{words} x {bits}", reads,
+                     "register file" if small else len(ms) * ms[0]["nx_ram48"],
+                     "register file" if small else len(ms) * ms[0]["nx_ram48_ecc"]])
+    total = nx_rows(flat(base, "chip_ng", "ng_medium")["memories"])
+    rows.append(["**all**", "", "", "", "", f"**{total[0]}**", f"**{total[1]}**"])
+    return markdown(["unit", "memory", "number", "words x bits", "read ports", "RAMB48 without ECC", "with ECC"], rows)
+
+
+def table_targets(base):
+    def verdict(good):
+        return "met" if good else "**missed**"
+
+    rows = []
+
+    def row(what, target, value, good):
+        rows.append([what, target, value, verdict(good)])
+    c = flat(base, "bands")["counts"]
+    row("one lane, 44-30-13-13, xc6v", "2,800 LUT, 3,000 FF, 84 RAMB36, 16 DSP",
+        f"{c['lut']:,} LUT, {c['ff']:,} FF, {num(c['ram36_equivalent'])} RAMB36, {c['dsp']} DSP",
+        c["lut"] <= 2800 and c["ff"] <= 3000 and c["ram36_equivalent"] <= 84 and c["dsp"] <= 16)
+    c, t = flat(base, "similarity")["counts"], flat(base, "similarity_tile")["counts"]
+    row("similarity alone, xc6v", "1,000 LUT, 10 DSP, 11 RAMB36; 4 RAMB36 on 256 x 130",
+        f"{c['lut']:,} LUT, {c['dsp']} DSP, {num(c['ram36_equivalent'])} RAMB36; {num(t['ram36_equivalent'])} RAMB36",
+        c["lut"] <= 1000 and c["dsp"] <= 10 and c["ram36_equivalent"] <= 11 and t["ram36_equivalent"] <= 4)
+    for name, target, prize in (("tile_2", 0.38, 0.6), ("tile_4", 0.5, 1.0)):
+        c = flat(base, name)["counts"]
+        value = efficiency(base["frames"][name], c["lut"])
+        row(f"efficiency, {base['frames'][name]['lanes']} lanes, 256 x 130", f"{target} (prize {prize})",
+            f"{value:.3f} with {c['lut']:,} LUT, {c['dsp']} DSP", value >= target)
+    found = flat(base, "chip_ng", "ng_medium")
+    c, blocks = found["counts"], nx_rows(found["memories"])[0]
+    sweep = base["frames"]["chip_ng"]["clocks"]
+    row("one NG-MEDIUM: chip, two lanes", "56 RAMB48 by modes, 26K LUT, 26K FF, 112 DSP, 220 M clocks",
+        f"{blocks} RAMB48 by modes ({c['ram48']} by Yosys), {c['lut']:,} LUT, {c['ff']:,} FF, {c['dsp']} DSP, "
+        f"{mega(sweep)} M clocks", blocks <= 56 and c["lut"] <= 26000 and c["ff"] <= 26000 and c["dsp"] <= 112
+        and sweep <= 220e6)
+    c, frame = flat(base, "chip_v5qv", "xc5v")["counts"], base["frames"]["chip_v5qv"]
+    shares = [c["lut"] / V5QV["lut"], c["ram36_equivalent"] / V5QV["ram"], c["dsp"] / V5QV["dsp"]]
+    row("one Virtex-5QV: chip, four lanes, both buffers", "60 % of LUT, RAM, DSP; 115 M clocks",
+        f"{c['lut']:,} LUT ({shares[0]:.0%}), {num(c['ram36_equivalent'])} RAMB36 ({shares[1]:.0%}), {c['dsp']} DSP "
+        f"({shares[2]:.0%}), {mega(frame['clocks'])} M clocks".replace("%", " %"),
+        max(shares) <= 0.6 and frame["clocks"] <= 115e6)
+    worst = flat(base, "bands")["levels"]["longest"]["lut"]
+    over = [u for u, p in flat(base, "bands")["levels"]["by_unit"].items() if p["lut"] > 5]
+    row("LUTs on a path, xc6v", "5", f"{worst}" + (": " + ", ".join(over) if over else ""), worst <= 5)
+    two = base.get("pnr", {}).get("psweep tile G_LANES=2")
+    if two:
+        row("ECP5-85, speed 8, two lanes, placed and routed", "150 MHz",
+            f"{two['best']:.1f} MHz (best), {two['median']:.1f} (median of {len(two['mhz'])})", two["median"] >= 150)
+    return markdown(["what", "target", "measured", ""], rows)
+
+
+def table_pnr(base):
+    return pnr.table(base["pnr"]) if base.get("pnr") else ""
+
+
+TABLES = {"engines": table_engines, "units": table_units, "cells": table_cells, "families": table_families,
+          "levels": table_levels, "five": table_five, "bits": table_bits, "nx": table_nx_rams,
+          "targets": table_targets, "pnr": table_pnr, "units_xc5v": lambda base: table_units(base, "xc5v")}
+
+
+def pages(base, check):
+    """Puts the tables between their markers; with check only compares. Number of tables found."""
+    number, wrong = 0, []
+    for page in PAGES:
+        text = page.read_text()
+
+        def fill(match):
+            nonlocal number
+            number += 1
+            if match[1] not in TABLES:
+                raise cost.CostError(f"{page.name}: no table '{match[1]}'")
+            return f"<!-- cost: {match[1]} -->\n{TABLES[match[1]](base)}\n<!-- /cost -->"
+        new = re.sub(r"<!-- cost: (\w+) -->\n.*?<!-- /cost -->", fill, text, flags=re.S)
+        if new != text:
+            wrong.append(page.name)
+            if not check:
+                page.write_text(new)
+    if number < len(TABLES):
+        raise cost.CostError(f"only {number} tables in the pages, there should be {len(TABLES)}")
+    if check and wrong:
+        raise cost.CostError(f"tables of {', '.join(wrong)} are not those of baseline.json: "
+                             "scripts/cost/report.py --pages writes them")
+    return number
+
+
+def plot(units, whole, path):
+    """Bars: units of the engine beside the paper's."""
+    data = []
+    for unit, paper in {**PAPER_UNITS, "all": PAPER_ALL}.items():
+        c = whole["counts"] if unit == "all" else units["units"][unit]["counts"]
+        data.append(" ".join(str(v) for v in (
+            unit.replace("address_generator", "address").replace("interpolation", "interpol."),
+            c["lut"], paper[0], c["ff"], paper[1], c["ram36_equivalent"], paper[2], c["dsp"], paper[3])))
+    script = """set terminal svg size 900,560 font 'sans-serif,13' background rgb 'white'
+set output '%s'
+$data << EOD
+%s
+EOD
+set multiplot layout 2,2 title '44-30-13-13 on Virtex-6: ours (Yosys, hierarchy kept; all: flat) and the paper (ISE 14.7)'
+set style data histograms
+set style histogram clustered gap 1
+set style fill solid 0.9 noborder
+set xtics rotate by -30 nomirror
+set ytics nomirror
+set grid ytics
+set yrange [0:*]
+set key top left
+""" % (path, "\n".join(data))
+    for n, title in enumerate(("LUT", "FF", "RAMB36", "DSP")):
+        script += (f"set title '{title}'\nplot $data using {2 * n + 2}:xtic(1) lc rgb '#1f5fa8' title 'ours', "
+                   f"'' using {2 * n + 3} lc rgb '#b35900' title 'the paper'\n")
+    done = subprocess.run(["gnuplot"], input=script, text=True, capture_output=True)
+    if done.returncode:
+        raise cost.CostError(f"gnuplot: {done.stderr}")
+    text = re.sub(r" +$", "", path.read_text().replace("\t", "  "), flags=re.M).rstrip("\n") + "\n"
+    path.write_text(text)
+
+
+# ---- baseline -------------------------------------------------------------------------------------------------------
+
+def all_questions(quick=False):
+    for name, point in POINTS.items():
+        for family in point.get("quick", ()) if quick else point["flat"]:
+            yield name, family, False
+        for family in () if quick else point.get("units", ()):
+            yield name, family, True
+
+
+def ghdl_version():
+    return subprocess.run(["ghdl", "--version"], capture_output=True, text=True).stdout.splitlines()[0]
+
+
+def baseline():
+    if not BASELINE.exists():
+        raise cost.CostError("no scripts/cost/baseline.json: scripts/cost/report.py --update makes it")
+    return json.loads(BASELINE.read_text())
+
+
+def collect(results, base):
+    for (name, family, hierarchy), result in results.items():
+        base["points"].setdefault(name, {}).setdefault(family, {})["units" if hierarchy else "flat"] = short(result)
+
+
+def write_baseline(base):
+    text = json.dumps(base, indent=0, sort_keys=True)
+    # Innermost objects on one line each: a change is a line.
+    text = re.sub(r"\{\n([^{}\[\]]*?)\n\}", lambda m: "{" + m[1].replace("\n", " ") + "}", text)
+    BASELINE.write_text(text + "\n")
+
+
+def compare(base, results, rtl):
+    """Number of counts compared; prints what differs. Growth and shrinkage apart."""
+    grown, shrunk, number = [], [], 0
+    for (name, family, hierarchy), result in results.items():
+        kept = base["points"].get(name, {}).get(family, {}).get("units" if hierarchy else "flat")
+        if kept is None:
+            raise cost.CostError(f"{name}, {family} is not in baseline.json: scripts/cost/report.py --update")
+        rows = [("", kept["counts"], result["counts"])]
+        rows += [(unit, row["counts"], result["units"].get(unit, {}).get("counts"))
+                 for unit, row in kept.get("units", {}).items()]
+        for unit, old, new in rows:
+            if new is None:
+                raise cost.CostError(f"{name}, {family}: there is no {unit} any more: scripts/cost/report.py --update")
+            for key, (share, few) in TOLERANCE.items():
+                number += 1
+                slack = old[key] * share + few
+                text = f"{name}, {family}{', ' + unit if unit else ''}: {key} {num(old[key])} -> {num(new[key])}"
+                if new[key] > old[key] + slack:
+                    grown.append(text)
+                elif new[key] < old[key] - slack:
+                    shrunk.append(text)
+    for text in grown:
+        print("grown:  " + text)
+    for text in shrunk:
+        print("shrunk: " + text)
+    return number, grown, shrunk
+
+
+# ---- command line ---------------------------------------------------------------------------------------------------
+
+def check(quick, rtl):
+    base = baseline()
+    if base["tool"] != cost.tool_version():
+        raise cost.CostError(f"baseline.json is of {base['tool']}, this is {cost.tool_version()}")
+    number, grown, shrunk = compare(base, run(list(all_questions(quick)), rtl), rtl)
+    if not number:
+        raise cost.CostError("nothing was compared")
+    if ghdl_version() != base["ghdl"]:
+        print(f"The baseline was converted by {base['ghdl']}, this is {ghdl_version()}.")
+    print(f"cost-check: {number} counts compared, {len(grown)} grown, {len(shrunk)} shrunk")
+    if grown or shrunk:
+        print("If this is meant: make cost-update writes baseline, tables and picture.")
+    return bool(grown) or bool(shrunk) and not quick
+
+
+def update(only_missing_pnr=False):
+    base = baseline() if BASELINE.exists() else {}
+    new = {"schema": cost.SCHEMA, "tool": cost.tool_version(), "ghdl": ghdl_version(), "points": {},
+           "frames": {}, "pnr": base.get("pnr", {})}
+    collect(run(list(all_questions())), new)
+    new["frames"] = {name: frame for name in POINTS if not name.startswith("G_") for frame in [clocks_of(name)] if frame}
+    write_baseline(new)
+    plot(new["points"]["bands"]["xc6v"]["units"], flat(new, "bands"), PICTURE)
+    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {pages(new, False)} tables")
+
+
+def route():
+    base = baseline()
+    seeds, tile = (1, 2, 3), cost.config_generics("psweep", "tile", cost.ROOT / "rtl")
+    jobs = int(os.environ.get("JOBS") or os.cpu_count() or 1)
+    base["pnr"] = {}
+    for unit in cost.ENGINE_UNITS:
+        base["pnr"][unit] = pnr.run_seeds("psweep", tile, seeds, 200, jobs=jobs, unit=unit)
+    for lanes in (1, 2):
+        name = "psweep tile" + (f" G_LANES={lanes}" if lanes > 1 else "")
+        base["pnr"][name] = pnr.run_seeds("psweep", {**tile, "G_LANES": lanes}, seeds, 200, jobs=jobs)
+    write_baseline(base)
+    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {pages(base, False)} tables")
+
+
+def show(results):
+    """What was measured, as tables: units beside the paper's, then the whole ones."""
+    for (name, family, hierarchy), result in results.items():
+        if not hierarchy:
+            continue
+        print(f"\n{name}, {FAMILY_NAMES[family]}, hierarchy kept; the paper's row (44-30-13-13, Virtex-6) under each\n")
+        print(f"{'':20} {'LUT':>8} {'FF':>8} {'RAMB36':>8} {'RAMB48':>8} {'DSP':>8} {'carry':>8} {'SRL':>8} {'LUTRAM':>8}")
+        for unit, row in result["units"].items():
+            print(cost.row_text(unit or "(between)", row["counts"]))
+            if unit in PAPER_UNITS and POINTS[name].get("entity", "psweep") == "psweep":
+                lut, ff, ram, dsp = PAPER_UNITS[unit]
+                print(f"{'  the paper':20} {lut:>8} {ff:>8} {ram:>8} {'':8} {dsp:>8}")
+        print(cost.row_text("all", result["counts"]))
+        if POINTS[name].get("entity", "psweep") == "psweep":
+            lut, ff, ram, dsp = PAPER_ALL
+            print(f"{'  the paper':20} {lut:>8} {ff:>8} {ram:>8} {'':8} {dsp:>8}")
+    rows = []
+    for (name, family, hierarchy), result in results.items():
+        if hierarchy:
+            continue
+        c, frame = result["counts"], None
+        try:
+            frame = clocks_of(name)
+        except cost.CostError:
+            pass
+        ram = num(c["ram36_equivalent"])
+        if family == "ng_medium":
+            ram = f"{c['ram48']} ({nx_rows(result['memories'])[0]} by modes)"
+        if family == "ecp5":
+            ram = f"{c['ram18']} DP16KD"
+        path = result.get("levels", {}).get("longest")
+        rows.append([POINTS[name]["title"], family, c["lut"], c["ff"], ram, c["dsp"], c["carry"],
+                     f"{path['lut']} + {path['carry']}" if path else "",
+                     mega(frame["clocks"]) if frame else "",
+                     f"{efficiency(frame, c['lut']):.2f}" if frame and not POINTS[name].get("entity") else ""])
+    if rows:
+        print("\n" + markdown(["", "family", "LUT", "FF", "RAM", "DSP", "carry", "LUTs + carry on the longest path",
+                               "M clocks", "efficiency"], rows))
+    for (name, family, hierarchy), result in results.items():
+        over = {u: p for u, p in result.get("levels", {}).get("by_unit", {}).items() if p["lut"] > 5}
+        if over and family in ("xc6v", "xc5v"):
+            print(f"\n{name}, {family}: more than 5 LUTs on a path in " + ", ".join(
+                f"{u} ({p['lut']}: {tidy(p['start'])} -> {tidy(p['end'])})" for u, p in over.items()))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--all", action="store_true")
+    parser.add_argument("--config", nargs="+")
+    parser.add_argument("--family")
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--update", action="store_true")
+    parser.add_argument("--pages", action="store_true")
+    parser.add_argument("--pnr", action="store_true")
+    parser.add_argument("--rtl", help="another folder instead of rtl/ (with --check)")
+    options = parser.parse_args()
+    try:
+        if options.pages:
+            number = pages(baseline(), options.check)
+            print(f"cost: {number} tables {'are those of baseline.json' if options.check else 'written'}")
+            return 0
+        if options.check:
+            return int(check(options.quick, options.rtl))
+        if options.update:
+            return update()
+        if options.pnr:
+            return route()
+        wanted = options.family.split(",") if options.family else None
+        for family in wanted or ():
+            if family not in families.FAMILIES:
+                raise cost.CostError(f"unknown family '{family}': " + ", ".join(families.FAMILIES))
+        if options.config:
+            for name in options.config:
+                if name not in POINTS:
+                    entity = "psweep_top" if (cost.ROOT / "tb/chip/configs" / f"{name}.json").exists() and \
+                        not (cost.ROOT / "tb/configs" / f"{name}.json").exists() else "psweep"
+                    cost.config_generics(entity, name, cost.ROOT / "rtl")
+                    POINTS[name] = {"title": name, "entity": entity, "config": name, "flat": ()}
+                    if entity == "psweep":
+                        del POINTS[name]["entity"]
+            questions = [(n, f, h) for n in options.config for f in wanted or ["xc6v"]
+                         for h in ((False,) if "unit" in POINTS[n] else (True, False))]
+        elif options.all:
+            questions = [q for q in all_questions() if not wanted or q[1] in wanted]
+        else:
+            questions = [(n, f, False) for n, p in POINTS.items() if p.get("default") for f in wanted or ["xc6v"]]
+            questions += [("bands", f, True) for f in wanted or ["xc6v"]]
+        results = run(questions)
+        show(results)
+        if ("bands", "xc6v", True) in results and ("bands", "xc6v", False) in results:
+            plot(results["bands", "xc6v", True], results["bands", "xc6v", False], OUT / "cost.svg")
+        print(f"\nJSON: {OUT.relative_to(cost.ROOT)}/*.json; {cost.tool_version()}, {ghdl_version()}")
+        return 0
+    except cost.CostError as error:
+        print(f"cost: {error}", file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
