@@ -9,17 +9,17 @@ NG_TILE = {"G_LANES": 2, "G_PLANE_COLS": 131, "G_PLANE_ROWS": 101, "G_IMG_COLS":
 
 POINTS = {
     "bands": {"title": "bands 44-30-13-13 (`tb/configs/bands.json`)", **BANDS, "default": True,
-              "flat": ("xc6v", "xc5v", "ecp5", "ng_medium"), "units": ("xc6v", "xc5v", "ng_medium"), "quick": ("xc6v",)},
-    "bands_no_dsp": {"title": "the same, products in LUTs", **BANDS, "no_dsp": True, "default": True, "flat": ("xc6v",)},
+              "flat": ("xc6v", "xc5v", "ecp5", "ng_medium"), "units": ("xc6v",), "quick": ("xc6v",)},
+    "bands_no_dsp": {"title": "the same, products in LUTs", **BANDS, "no_dsp": True, "default": True,
+                     "flat": ("xc6v",)},
     "tile": {"title": "`tile`: 256 x 130 cells, buffer 362 x 144", **TILE, "default": True,
-             "flat": ("xc6v", "ecp5"), "units": ("xc6v",)},
+             "flat": ("xc6v",)},
     "tile_rectified": {"title": "the same, rectified", **TILE, "generics": {"G_RECTIFIED": 1}, "default": True,
                        "flat": ("xc6v",)},
-    "tile_84": {"title": "the same, pixels of 8.4", **TILE, "generics": {"G_INTERP_F": 4}, "flat": ("xc6v",)},
     "tile_2": {"title": "`tile`, two lanes", **TILE, "generics": {"G_LANES": 2}, "default": True,
-               "flat": ("xc6v", "ecp5", "ng_medium")},
+               "flat": ("xc6v", "ecp5")},
     "tile_4": {"title": "`tile`, four lanes", **TILE, "generics": {"G_LANES": 4}, "default": True,
-               "flat": ("xc6v", "xc5v")},
+               "flat": ("xc6v",)},
     "mbit": {"title": "117 x 93 cells, buffer 220 x 106: 1 Mbit", "tile": (117, 93), "default": True, "flat": ("xc6v",),
              "generics": {"G_IMG_COLS": 220, "G_IMG_ROWS": 106, "G_PLANE_COLS": 117, "G_PLANE_ROWS": 93}},
     "integer": {"title": "128 integer depths, 1950 x 1950 pixels, rectified, two lanes", "tile": (256, 130),
@@ -29,7 +29,7 @@ POINTS = {
     "arbiter": {"title": "MAC, stack, arbiter; smallest buffers of rows and map", "entity": "arbiter", **BANDS,
                 "tile": None, "generics": {"G_ROW_SLOTS": 2, "G_MAP_DEPTH": 704}, "default": True, "flat": ("xc6v",)},
     "arbiter_double": {"title": "the same with both buffers, 44-30-13-13", "entity": "arbiter", **BANDS, "tile": None,
-                       "default": True, "flat": ("xc6v",), "units": ("xc6v",)},
+                       "default": True, "flat": ("xc6v",)},
     "chip": {"title": "chip `psweep_top`: `tile`, one lane, both buffers", "entity": "psweep_top", **TILE,
              "default": True, "flat": ("xc6v",)},
     "chip_v5qv": {"title": "chip: `tile`, four lanes, both buffers", "entity": "psweep_top", **TILE,
@@ -45,7 +45,7 @@ POINTS = {
                  "flat": ("ng_medium",), "quick": ("ng_medium",)},
 }
 # One generic of `tile` at a time.
-BITS = {"G_INTERP_F": (0, 1, 2, 3, 4), "G_MNCC_W": (10, 11, 12, 13, 14, 16), "G_FRAC_W": (4, 6, 8, 10)}
+BITS = {"G_INTERP_F": (0, 1, 2, 3, 4), "G_MNCC_W": (10, 12, 13, 14, 16), "G_FRAC_W": (6, 8, 10)}
 SHIPPED = {"G_INTERP_F": 2, "G_MNCC_W": 13, "G_FRAC_W": 8}
 for _generic, _values in BITS.items():
     for _value in _values:

@@ -303,7 +303,7 @@ def table_pnr(base):
 
 TABLES = {"engines": table_engines, "units": table_units, "cells": table_cells, "families": table_families,
           "levels": table_levels, "five": table_five, "bits": table_bits, "nx": table_nx_rams,
-          "targets": table_targets, "pnr": table_pnr, "units_xc5v": lambda base: table_units(base, "xc5v")}
+          "targets": table_targets, "pnr": table_pnr}
 
 
 def pages(base, check):
@@ -428,6 +428,9 @@ def compare(base, results, rtl):
 
 def check(quick, rtl):
     base = baseline()
+    if quick and not (cost.venv() / "bin" / "python3").exists():
+        print("SKIPPED: no Yosys of a known version: scripts/setup.sh cost")
+        return False
     if base["tool"] != cost.tool_version():
         raise cost.CostError(f"baseline.json is of {base['tool']}, this is {cost.tool_version()}")
     number, grown, shrunk = compare(base, run(list(all_questions(quick)), rtl), rtl)
@@ -441,27 +444,27 @@ def check(quick, rtl):
     return bool(grown) or bool(shrunk) and not quick
 
 
-def update(only_missing_pnr=False):
+def update(rtl):
     base = baseline() if BASELINE.exists() else {}
     new = {"schema": cost.SCHEMA, "tool": cost.tool_version(), "ghdl": ghdl_version(), "points": {},
            "frames": {}, "pnr": base.get("pnr", {})}
-    collect(run(list(all_questions())), new)
+    collect(run(list(all_questions()), rtl), new)
     new["frames"] = {name: frame for name in POINTS if not name.startswith("G_") for frame in [clocks_of(name)] if frame}
     write_baseline(new)
     plot(new["points"]["bands"]["xc6v"]["units"], flat(new, "bands"), PICTURE)
     print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {pages(new, False)} tables")
 
 
-def route():
+def route(rtl):
     base = baseline()
     seeds, tile = (1, 2, 3), cost.config_generics("psweep", "tile", cost.ROOT / "rtl")
     jobs = int(os.environ.get("JOBS") or os.cpu_count() or 1)
     base["pnr"] = {}
     for unit in cost.ENGINE_UNITS:
-        base["pnr"][unit] = pnr.run_seeds("psweep", tile, seeds, 200, jobs=jobs, unit=unit)
+        base["pnr"][unit] = pnr.run_seeds("psweep", tile, seeds, 200, rtl, jobs, unit)
     for lanes in (1, 2):
         name = "psweep tile" + (f" G_LANES={lanes}" if lanes > 1 else "")
-        base["pnr"][name] = pnr.run_seeds("psweep", {**tile, "G_LANES": lanes}, seeds, 200, jobs=jobs)
+        base["pnr"][name] = pnr.run_seeds("psweep", {**tile, "G_LANES": lanes}, seeds, 200, rtl, jobs)
     write_baseline(base)
     print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {pages(base, False)} tables")
 
@@ -521,7 +524,7 @@ def main():
     parser.add_argument("--update", action="store_true")
     parser.add_argument("--pages", action="store_true")
     parser.add_argument("--pnr", action="store_true")
-    parser.add_argument("--rtl", help="another folder instead of rtl/ (with --check)")
+    parser.add_argument("--rtl", help="another folder instead of rtl/ (--check, --update, --pnr)")
     options = parser.parse_args()
     try:
         if options.pages:
@@ -531,9 +534,9 @@ def main():
         if options.check:
             return int(check(options.quick, options.rtl))
         if options.update:
-            return update()
+            return update(options.rtl)
         if options.pnr:
-            return route()
+            return route(options.rtl)
         wanted = options.family.split(",") if options.family else None
         for family in wanted or ():
             if family not in families.FAMILIES:
