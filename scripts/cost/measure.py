@@ -304,6 +304,10 @@ def row_text(name, counts):
         f"{counts[key]:>8g}" for key in ("lut", "ff", "ram36_equivalent", "ram48", "dsp", "carry", "srl", "lutram"))
 
 
+HEAD_TEXT = " " * 21 + " ".join(
+    f"{title:>8}" for title in ("LUT", "FF", "RAMB36", "RAMB48", "DSP", "carry", "SRL", "LUTRAM"))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--entity", default="psweep")
@@ -338,8 +342,7 @@ def main():
         pathlib.Path(options.json).write_text(text)
     print(f"{options.unit or options.entity} on {options.family}, {result['tool']}"
           f"{' (kept)' if result['cached'] else ''}, {result['seconds']} s")
-    print(f"{'':20} " + " ".join(f"{t:>8}" for t in
-                                ("LUT", "FF", "RAMB36", "RAMB48", "DSP", "carry", "SRL", "LUTRAM")))
+    print(HEAD_TEXT)
     for unit, row in sorted(result.get("units", {}).items()):
         print(row_text(unit or "(between)", row["counts"]))
     print(row_text("all", result["counts"]))

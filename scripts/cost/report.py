@@ -141,7 +141,8 @@ def table_engines(base):
         c, frame = found["counts"], base["frames"].get(name)
         title = point["title"] + ("; the paper's arbiter: 3K LUT, 55 RAMB36" if name == "arbiter_double" else "") + \
             ("; the paper: 12.6K LUT" if point.get("no_dsp") else "")
-        rows.append([title, c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"], mega(frame["clocks"]) if frame else "",
+        rows.append([title, c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"],
+                     mega(frame["clocks"]) if frame else "",
                      f"{efficiency(frame, c['lut']):.2f}" if frame and point.get("entity") is None else ""])
         if name == "bands":
             rows.append(paper)
@@ -158,7 +159,8 @@ def table_units(base, family="xc6v"):
         rows.append([unit] + [x for pair in zip(ours, paper) for x in pair])
     rest = found["units"][""]["counts"]
     rows.append(["between them", rest["lut"], "", rest["ff"], "", num(rest["ram36_equivalent"]), "", rest["dsp"], ""])
-    for title, c in (("all, hierarchy kept", found["counts"]), ("**all, flat**", flat(base, "bands", family)["counts"])):
+    whole = flat(base, "bands", family)["counts"]
+    for title, c in (("all, hierarchy kept", found["counts"]), ("**all, flat**", whole)):
         ours = (c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"])
         rows.append([title] + [x for pair in zip(ours, PAPER_ALL) for x in pair])
     return markdown(head, rows)
@@ -241,8 +243,8 @@ def table_bits(base):
 def table_nx_rams(base):
     rows, groups = [], {}
     for m in flat(base, "chip_ng", "ng_medium")["memories"]:
-        groups.setdefault((m["unit"], re.sub(r"_?\d+$", "", m["path"].split(".")[-1].split("_u_")[-1].removeprefix("u_")),
-                           m["words"], m["bits"], m["reads"]), []).append(m)
+        name = re.sub(r"_?\d+$", "", re.sub(r"^(.*_)?u_", "", m["path"].split(".")[-1]))
+        groups.setdefault((m["unit"], name, m["words"], m["bits"], m["reads"]), []).append(m)
     for (unit, name, words, bits, reads), ms in groups.items():
         small = words <= 64
         rows.append([unit or "arbiter", name, len(ms), f"{words} x {bits}", reads,
@@ -344,7 +346,7 @@ set output '%s'
 $data << EOD
 %s
 EOD
-set multiplot layout 2,2 title '44-30-13-13 on Virtex-6: ours (Yosys, hierarchy kept; all: flat) and the paper (ISE 14.7)'
+set multiplot layout 2,2 title '44-30-13-13 on Virtex-6: ours (Yosys; all: flat) and the paper (ISE 14.7)'
 set style data histograms
 set style histogram clustered gap 1
 set style fill solid 0.9 noborder
@@ -449,7 +451,8 @@ def update(rtl):
     new = {"schema": cost.SCHEMA, "tool": cost.tool_version(), "ghdl": ghdl_version(), "points": {},
            "frames": {}, "pnr": base.get("pnr", {})}
     collect(run(list(all_questions()), rtl), new)
-    new["frames"] = {name: frame for name in POINTS if not name.startswith("G_") for frame in [clocks_of(name)] if frame}
+    frames = {name: clocks_of(name) for name in POINTS if not name.startswith("G_")}
+    new["frames"] = {name: frame for name, frame in frames.items() if frame}
     write_baseline(new)
     plot(new["points"]["bands"]["xc6v"]["units"], flat(new, "bands"), PICTURE)
     print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {pages(new, False)} tables")
@@ -475,7 +478,7 @@ def show(results):
         if not hierarchy:
             continue
         print(f"\n{name}, {FAMILY_NAMES[family]}, hierarchy kept; the paper's row (44-30-13-13, Virtex-6) under each\n")
-        print(f"{'':20} {'LUT':>8} {'FF':>8} {'RAMB36':>8} {'RAMB48':>8} {'DSP':>8} {'carry':>8} {'SRL':>8} {'LUTRAM':>8}")
+        print(cost.HEAD_TEXT)
         for unit, row in result["units"].items():
             print(cost.row_text(unit or "(between)", row["counts"]))
             if unit in PAPER_UNITS and POINTS[name].get("entity", "psweep") == "psweep":
