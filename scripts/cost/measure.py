@@ -20,6 +20,7 @@ same question again costs a second. From Python: measure(entity, family, generic
 Environment: COST_VENV names another virtual environment, COST_CACHE another cache.
 """
 import argparse
+import ast
 import functools
 import hashlib
 import inspect
@@ -120,8 +121,9 @@ def repair(verilog):
 
 
 def name_registers(verilog):
-    """GHDL calls a register n123_q and then assigns it to the signal of the source, whose name Yosys drops: gives the
-    register the name of the signal, so that paths can be named."""
+    """GHDL calls a register n123_q and then assigns it to the signal of the source: gives the register the name of the
+    signal, so that paths can be named. All other names of this kind get underscores at both ends, which makes them
+    private for Yosys; of two public names for one net it would keep the alphabetically first."""
     def module(match):
         text = match[0]
         registers = set(re.findall(r"^  reg (?:\[\d+:0\] )?(n\d+_[oq]);$", text, re.M))
@@ -130,8 +132,6 @@ def name_registers(verilog):
         for signal, register in re.findall(r"^  assign (\w+) = (n\d+_[oq]); // \(signal\)$", text, re.M):
             if register in registers and signal in wires and register not in new:
                 new[register] = signal
-        if not new:
-            return text
         taken = set(new.values())
         text = re.sub(r"^  wire (?:\[\d+:0\] )?(\w+);\n", lambda m: "" if m[1] in taken else m[0], text, flags=re.M)
         text = re.sub(r"^  assign (\w+) = (n\d+_[oq]); // \(signal\)\n",
@@ -142,7 +142,7 @@ def name_registers(verilog):
             text = text.replace(line, "", 1)
         head = re.match(r"module .*?\);\n", text, re.S)
         text = head[0] + "".join(lines) + text[head.end():]
-        return re.sub(r"\bn\d+_[oq]\b", lambda m: new.get(m[0], m[0]), text)
+        return re.sub(r"\bn\d+_[oq]\b", lambda m: new.get(m[0], f"_{m[0]}_"), text)
     return re.sub(r"^module .*?^endmodule", module, verilog, flags=re.M | re.S)
 
 
@@ -196,7 +196,7 @@ def script_hash():
     digest = hashlib.sha256()
     for name in ("families.py", "netlist.py", "yosys_run.py"):
         digest.update((HERE / name).read_bytes())
-    digest.update(inspect.getsource(synthesise).encode())
+    digest.update(ast.dump(ast.parse(inspect.getsource(synthesise))).encode())
     return digest.hexdigest()
 
 
@@ -247,8 +247,8 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     rows = [m for m in modules if netlists.entity_of(m, entities) in units and strip_top(m) != top] \
         if hierarchy else []
     read = [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
-    commands = read + [f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap", "wreduce t:$mul", "opt_clean",
-                       f"write_json {work}/memories.json", "new design"]
+    commands = read + [f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap", "wreduce t:$mul",
+                       "opt_clean", f"write_json {work}/memories.json", "new design"]
     commands += read + [f"setattr -mod -set keep_hierarchy 1 {m}" for m in rows]
     commands += families.commands(family, top, no_dsp, work) + [f"write_json {work}/netlist.json"]
     run_yosys(commands, work)

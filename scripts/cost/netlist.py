@@ -84,7 +84,7 @@ class Levels:
         names = {}
         for name, net in module["netnames"].items():
             rank = (int(net.get("hide_name", 0)), "$" in name, "NX_" in name,
-                    bool(re.search(r"(^|[._])n\d+(_[oq])?$", name)), len(name))
+                    bool(re.search(r"(^|[._])_?n\d+(_[oq]_?)?$", name)), len(name))
             for index, bit in enumerate(net["bits"]):
                 if isinstance(bit, int) and (bit not in names or rank < names[bit][0]):
                     names[bit] = (rank, f"{name}[{index}]" if len(net["bits"]) > 1 else name)
