@@ -35,6 +35,7 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+sys.dont_write_bytecode = True
 sys.path.insert(0, str(HERE))
 
 import families  # noqa: E402  (the folder of this script, whatever the current one is)

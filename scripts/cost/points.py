@@ -40,7 +40,7 @@ POINTS = {
     "similarity": {"title": "unit similarity of bands", "unit": "similarity", **BANDS, "tile": None,
                    "flat": ("xc6v", "ng_medium"), "quick": ("ng_medium",)},
     "similarity_tile": {"title": "unit similarity of `tile`", "unit": "similarity", **TILE, "tile": None,
-                        "flat": ("xc6v",), "quick": ("xc6v",)},
+                        "flat": ("xc6v",)},
     "updating": {"title": "unit updating of bands", "unit": "updating", **BANDS, "tile": None,
                  "flat": ("ng_medium",), "quick": ("ng_medium",)},
 }

@@ -24,6 +24,7 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
+sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 import families  # noqa: E402
@@ -488,6 +489,9 @@ def show(results):
         if POINTS[name].get("entity", "psweep") == "psweep":
             lut, ff, ram, dsp = PAPER_ALL
             print(f"{'  the paper':20} {lut:>8} {ff:>8} {ram:>8} {'':8} {dsp:>8}")
+        sizes = sorted(k for k in result["cells"] if re.match(r"LUT|NX_LUT|INV|SRL|RAM\d", k))
+        print("\nLUT by size\n\n" + markdown(["", *sizes], [
+            [unit or "(between)"] + [row["cells"].get(k, 0) for k in sizes] for unit, row in result["units"].items()]))
     rows = []
     for (name, family, hierarchy), result in results.items():
         if hierarchy:
