@@ -6,6 +6,7 @@ leaves products in logic; here they are mapped to blocks of 24 x 18 bits signed,
 Yosys' own mul2dsp.v (products of less than 4 bits a side stay logic). Registers next to these blocks are not packed
 into them, so flip-flops are counted too high there.
 """
+import inspect
 import re
 
 FAMILIES = ("xc6v", "xc5v", "ecp5", "ng_medium")
@@ -14,6 +15,14 @@ FAMILIES = ("xc6v", "xc5v", "ecp5", "ng_medium")
 NX_MUL_CELL = "PSWEEP_NX_MUL"
 NX_MUL_MAP = f"""
 (* blackbox *) module {NX_MUL_CELL} (input [23:0] A, input [17:0] B, output [41:0] Y); endmodule
+"""
+# Yosys 0.70 maps small memories of NG-MEDIUM to a register file whose module it forgot: declared here, so that it can
+# be counted (64 words of 16 bits).
+NX_RFB_DECLARED = """
+(* blackbox *) module NX_RFB_M_WRAP (input RCK, input WCK, input RE, input WE, input [15:0] I, input [5:0] RA,
+  input [5:0] WA, output [15:0] O, output COR, output ERR);
+  parameter mode = 0; parameter mem_ctxt = ""; parameter rck_edge = 1'b0; parameter wck_edge = 1'b0;
+endmodule
 """
 NX_MUL_TECHMAP = f"""
 module \\$__NX_MUL (A, B, Y);
@@ -35,13 +44,19 @@ def commands(family, top, no_dsp, work):
         return [f"synth_xilinx -family {family} -flatten -noiopad {'-nodsp' if no_dsp else ''} -top {top}"]
     if family == "ecp5":
         return [f"synth_ecp5 {'-nodsp' if no_dsp else ''} -top {top}"]
-    if family != "ng_medium":
-        raise ValueError(f"unknown family '{family}': " + ", ".join(FAMILIES))
-    products = []
+    if family == "ng_medium":
+        return nx_commands(top, no_dsp, work)
+    raise ValueError(f"unknown family '{family}': " + ", ".join(FAMILIES))
+
+
+def nx_commands(top, no_dsp, work):
+    """The same for NG-MEDIUM."""
+    (work / "nx_rfb.v").write_text(NX_RFB_DECLARED)
+    products = [f"read_verilog -lib {work}/nx_rfb.v"]
     if not no_dsp:
         (work / "nx_mul.v").write_text(NX_MUL_MAP)
         (work / "nx_mul_map.v").write_text(NX_MUL_TECHMAP)
-        products = [
+        products += [
             f"read_verilog -lib {work}/nx_mul.v",
             f"hierarchy -check -top {top}", "proc", "flatten", "opt", "wreduce", "opt_clean",
             "techmap -map +/mul2dsp.v -D DSP_A_MAXWIDTH=24 -D DSP_B_MAXWIDTH=18 -D DSP_A_MINWIDTH=4"
@@ -50,6 +65,12 @@ def commands(family, top, no_dsp, work):
             f"techmap -map {work}/nx_mul_map.v",
         ]
     return products + [f"synth_nanoxplore -family medium -noiopad -top {top}"]
+
+
+def fingerprint(family):
+    """All that is particular to a family, as text: a kept result is good only as long as this does not change."""
+    nx = (inspect.getsource(nx_commands), NX_MUL_MAP, NX_RFB_DECLARED, NX_MUL_TECHMAP)
+    return repr((inspect.getsource(commands), KINDS[STYLE[family]], nx if family == "ng_medium" else ()))
 
 
 # Kind of a cell, by the first pattern that matches; how many LUTs one of them takes.

@@ -193,11 +193,11 @@ def take_unit(verilog, unit, entities):
     return "".join(text for name, text in modules.items() if name in wanted), found[0]
 
 
-def script_hash():
-    digest = hashlib.sha256()
-    for name in ("families.py", "netlist.py", "yosys_run.py"):
+def script_hash(family):
+    digest = hashlib.sha256(families.fingerprint(family).encode())
+    for name in ("netlist.py", "yosys_run.py"):
         digest.update((HERE / name).read_bytes())
-    digest.update(ast.dump(ast.parse(inspect.getsource(synthesise))).encode())
+    digest.update(SYNTHESISE)
     return digest.hexdigest()
 
 
@@ -216,7 +216,7 @@ def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=No
         top = entity
         if unit:
             verilog, top = take_unit(verilog, unit, [f[:-4] for f in all_entities(rtl)])
-        question = [verilog, top, family, hierarchy, no_dsp, list(units), tool_version(), script_hash()]
+        question = [verilog, top, family, hierarchy, no_dsp, list(units), tool_version(), script_hash(family)]
         key = hashlib.sha256(json.dumps(question).encode()).hexdigest()
         kept = pathlib.Path(os.environ.get("COST_CACHE", ROOT / "build" / "cost" / "cache")) / f"{key}.json"
         result = None
@@ -294,6 +294,10 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
 def plain(cells):
     """Primitives only, sorted."""
     return {name: number for name, number in sorted(cells.items()) if not name.startswith("$")}
+
+
+# Its text when this started: a file that changes meanwhile must not name results of the old one.
+SYNTHESISE = ast.dump(ast.parse(inspect.getsource(synthesise))).encode()
 
 
 def strip_top(module):

@@ -464,12 +464,12 @@ def route(rtl):
     seeds, tile = (1, 2, 3), cost.config_generics("psweep", "tile", cost.ROOT / "rtl")
     jobs = int(os.environ.get("JOBS") or os.cpu_count() or 1)
     base["pnr"] = {}
-    for unit in cost.ENGINE_UNITS:
-        base["pnr"][unit] = pnr.run_seeds("psweep", tile, seeds, 200, rtl, jobs, unit)
-    for lanes in (1, 2):
-        name = "psweep tile" + (f" G_LANES={lanes}" if lanes > 1 else "")
-        base["pnr"][name] = pnr.run_seeds("psweep", {**tile, "G_LANES": lanes}, seeds, 200, rtl, jobs)
-    write_baseline(base)
+    questions = [(unit, unit, 1) for unit in cost.ENGINE_UNITS]
+    questions += [("psweep tile", None, 1), ("psweep tile G_LANES=2", None, 2)]
+    for name, unit, lanes in questions:
+        generics = {**tile, "G_LANES": lanes} if lanes > 1 else tile
+        base["pnr"][name] = pnr.run_seeds("psweep", generics, seeds, 200, rtl, jobs, unit)
+        write_baseline(base)  # what is there, is there
     print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {pages(base, False)} tables")
 
 
