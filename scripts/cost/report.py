@@ -13,6 +13,7 @@
   scripts/cost/report.py --pnr               place and route into baseline.json and the pages (half an hour)
 
 Everything is written to build/cost/ as JSON (fields: docs/cost.md), with the plot cost.svg. JOBS: measurements at once.
+SHAPE_TABLE: another program than build/shape_table.
 """
 import argparse
 import json
@@ -92,9 +93,8 @@ def clocks_of(name):
     point = POINTS[name]
     if not point.get("tile"):
         return None
-    program = next((p for p in (cost.ROOT / "build" / "shape_table", pathlib.Path(os.environ.get("SHAPE_TABLE", "/")))
-                    if p.is_file()), None)
-    if program is None:
+    program = pathlib.Path(os.environ.get("SHAPE_TABLE", cost.ROOT / "build" / "shape_table"))
+    if not program.is_file():
         raise cost.CostError("no build/shape_table: run scripts/build.sh shape_table (make cost does)")
     numbers = [str(n) for n in point["tile"]]
     if "pixels" in point:
@@ -147,7 +147,7 @@ def table_engines(base):
                      f"{efficiency(frame, c['lut']):.2f}" if frame and point.get("entity") is None else ""])
         if name == "bands":
             rows.append(paper)
-    return markdown(["xc6v", "LUT", "FF", "RAMB36", "DSP48E1", "M clocks", "efficiency"], rows)
+    return markdown(["Virtex-6 (xc6v)", "LUT", "FF", "RAMB36", "DSP48E1", "M clocks", "efficiency"], rows)
 
 
 def table_units(base, family="xc6v"):
@@ -214,6 +214,7 @@ def table_levels(base):
 
 
 def tidy(name):
+    name = re.sub(r"^dsp (?:.*u_)?(\w+)\.$", r"a DSP of \1", name)
     return re.sub(r"^(ram36|ram18|srl|dsp|lutram) ", r"\1: ", name.replace("g_address_n1_u_", "").replace(
         "g_similarity_n1_u_", ""))
 
