@@ -22,6 +22,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import textwrap
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -395,8 +396,8 @@ def collect(results, base):
 
 def write_baseline(base):
     text = json.dumps(base, indent=0, sort_keys=True)
-    # Innermost objects on one line each: a change is a line.
-    text = re.sub(r"\{\n([^{}\[\]]*?)\n\}", lambda m: "{" + m[1].replace("\n", " ") + "}", text)
+    # Innermost objects on few lines: a change is a line.
+    text = re.sub(r"\{\n([^{}\[\]]*?)\n\}", lambda m: "{" + textwrap.fill(m[1].replace("\n", " "), 100) + "}", text)
     BASELINE.write_text(text + "\n")
 
 
