@@ -74,13 +74,13 @@ sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recor
 	@scripts/sim_gates.sh
 
 .PHONY: cost
-cost: setup ## LUT, FF, RAM, DSP of the engines beside the paper's, by Yosys (4 minutes)   CFG=tile FAMILY=xc6v,.. ALL=1
+cost: setup ## LUT, FF, RAM, DSP of the engines beside the paper's, by Yosys (minutes)   CFG=tile FAMILY=xc6v,.. ALL=1
 	@scripts/setup.sh cost
 	@scripts/build.sh shape_table
 	@scripts/cost/report.py $(if $(CFG),--config $(CFG)) $(if $(ALL),--all) $(if $(FAMILY),--family $(FAMILY))
 
 .PHONY: cost-check
-cost-check: setup ## All counts again (10 minutes): are they those of docs/cost.md? Growth fails
+cost-check: setup ## All counts again (ten minutes): are they those of docs/cost.md? Growth fails
 	@scripts/setup.sh cost
 	@scripts/cost/report.py --check
 
@@ -91,7 +91,7 @@ cost-update: setup ## All counts again into scripts/cost/baseline.json, docs/cos
 	@scripts/cost/report.py --update
 
 .PHONY: pnr
-pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (10 minutes)   CFG=tile SEEDS=1,2,3
+pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (half an hour)   CFG=tile SEEDS=1,2,3
 	@scripts/setup.sh build cost
 	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS))
 
