@@ -169,7 +169,8 @@ def convert(entity, generics, rtl, work):
     verilog = ghdl("--synth", *options, "--no-formal", *[f"-g{k}={v}" for k, v in sorted(generics.items())],
                    "--out=verilog", entity)
     verilog, repaired = repair(verilog)
-    return name_registers(verilog), repaired
+    # Without GHDL's /* file:line:column */, which would make every comment in the VHDL a new question.
+    return name_registers(re.sub(r"^ */\*[^*]*\*/\n", "", verilog, flags=re.M)), repaired
 
 
 def run_yosys(commands, work):

@@ -303,7 +303,8 @@ def table_targets(base):
 
 
 def table_pnr(base):
-    return pnr.table(base["pnr"]) if base.get("pnr") else ""
+    order = [*cost.ENGINE_UNITS, "psweep tile", "psweep tile G_LANES=2"]
+    return pnr.table({name: base["pnr"][name] for name in order if name in base.get("pnr", {})})
 
 
 TABLES = {"engines": table_engines, "units": table_units, "cells": table_cells, "families": table_families,
@@ -458,7 +459,7 @@ def update(rtl):
     new["frames"] = {name: frame for name, frame in frames.items() if frame}
     write_baseline(new)
     plot(new["points"]["bands"]["xc6v"]["units"], flat(new, "bands"), PICTURE)
-    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {pages(new, False)} tables")
+    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {pages(baseline(), False)} tables")
 
 
 def route(rtl):
@@ -472,7 +473,7 @@ def route(rtl):
         generics = {**tile, "G_LANES": lanes} if lanes > 1 else tile
         base["pnr"][name] = pnr.run_seeds("psweep", generics, seeds, 200, rtl, jobs, unit)
         write_baseline(base)  # what is there, is there
-    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {pages(base, False)} tables")
+    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {pages(baseline(), False)} tables")
 
 
 def show(results):
