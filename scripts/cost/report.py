@@ -459,7 +459,8 @@ def update(rtl):
     new["frames"] = {name: frame for name, frame in frames.items() if frame}
     write_baseline(new)
     plot(new["points"]["bands"]["xc6v"]["units"], flat(new, "bands"), PICTURE)
-    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {pages(baseline(), False)} tables")
+    number = pages(baseline(), False)
+    print(f"wrote {BASELINE.relative_to(cost.ROOT)}, {PICTURE.relative_to(cost.ROOT)}, {number} tables")
 
 
 def route(rtl):
