@@ -282,7 +282,8 @@ def table_targets(base):
     found = flat(base, "chip_ng", "ng_medium")
     c, blocks = found["counts"], nx_rows(found["memories"])[0]
     sweep = base["frames"]["chip_ng"]["clocks"]
-    row("one NG-MEDIUM: chip, two lanes (waiting for the link: `make link-table`)", "56 RAMB48 by modes, 26K LUT, 26K FF, 112 DSP, 220 M clocks",
+    row("one NG-MEDIUM: chip, two lanes (waiting for the link: `make link-table`)",
+        "56 RAMB48 by modes, 26K LUT, 26K FF, 112 DSP, 220 M clocks",
         f"{blocks} RAMB48 by modes ({c['ram48']} by Yosys), {c['lut']:,} LUT, {c['ff']:,} FF, {c['dsp']} DSP, "
         f"{mega(sweep)} M clocks", blocks <= 56 and c["lut"] <= 26000 and c["ff"] <= 26000 and c["dsp"] <= 112
         and sweep <= 220e6)
