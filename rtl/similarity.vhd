@@ -1,13 +1,19 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- similarity: MNCC of the left and right samples over G_WINDOW x G_WINDOW windows (paper, section 4.2.2, equation 1).
---   Method  : p = l + r, q = l - r, n = M*M, A = n S(p^2) - (S p)^2, B = n S(q^2) - (S q)^2, V = (A - B) / (A + B).
---             Per column the four sums over the last M rows are kept in one RAM; a new sample changes them by
---             d = new - old and d * (new + old) = new^2 - old^2, so one product serves each of p and q. The window sums
---             follow from the column sums likewise, as running sums. Nothing grows with M but RAM depth.
+--   Method  : V = 2 (n S(lr) - S(l) S(r)) / (n S(l^2 + r^2) - S(l)^2 - S(r)^2), n = M*M, S over the window: twice the
+--             covariance over the sum of the variances. Offsets of l and r, and the sign of r together with that of V's
+--             numerator, change nothing, so the circuit takes l' = l - 2^(S-1) and r' = 2^(S-1) - 1 - r: bits inverted.
+--             Per column the sums of l', r', x = l'r' and y = l'^2 + r'^2 over the last M rows are kept in one RAM; a
+--             new sample changes them by new - old: with a = l' - l'old and c = r' - r'old, dx = a r' + l'old c and
+--             dy = a (l' + l'old) + c (r' + r'old). Window sums follow from column sums likewise, as running sums.
+--             Nothing grows with M but RAM depth.
+--   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
+--             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
+--             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
 --   Rate    : one sample per clock; cells leave in raster order
 --   Latency : similarity_latency(G_MNCC_W) clocks from the last sample of a window to its cell (psweep_pkg)
---   Numbers : samples ufix(G_SAMPLE_W,0); sums, A, B exact; operands of the division truncated to G_MNCC_W+3 bits with
---             the denominator's leading one on top; V ufix(0,G_MNCC_W) truncated, 0 where A <= B, A + B = 0 or outside
+--   Numbers : samples ufix(G_SAMPLE_W,0); all sums exact; operands of the division truncated to G_MNCC_W+3 bits with the
+--             denominator's leading one on top; V ufix(0,G_MNCC_W) truncated, 0 where cov <= 0, both flat or outside
 --   Rows    : any length from G_WINDOW to G_MAX_COLS, the same for all rows of a plane; a row takes at least C_ROW_MIN
 --             clocks, which is what the loop through the column sums needs
 --   State   : a plane begins with s_plane_first; nothing is carried over from the plane before
@@ -41,7 +47,7 @@ entity similarity is
     m_valid    : out std_logic;
     m_last     : out std_logic; -- last cell of the plane
     m_inside   : out std_logic; -- all M*M samples are usable
-    m_textured : out std_logic; -- inside, and A + B > 0
+    m_textured : out std_logic; -- inside, and not flat: var(l) + var(r) > 0
     m_v        : out std_logic_vector(G_MNCC_W - 1 downto 0)
   );
 end entity similarity;
@@ -54,20 +60,13 @@ architecture rtl of similarity is
   constant C_NORM  : integer := G_MNCC_W + 3;
   constant C_SAT_W : integer := clog2(G_WINDOW + 1);
 
-  -- Widths: p, |q| and their squares; column sums; window sums; A, B, A + B <= n^2 (2^G_SAMPLE_W - 1)^2.
-  constant C_P_W   : integer := G_SAMPLE_W + 1;
-  constant C_P2_W  : integer := 2 * G_SAMPLE_W + 2;
-  constant C_Q2_W  : integer := 2 * G_SAMPLE_W;
-  constant C_CP_W  : integer := C_P_W + C_GROW;
-  constant C_CP2_W : integer := C_P2_W + C_GROW;
-  constant C_CQ_W  : integer := C_P_W + C_GROW;
-  constant C_CQ2_W : integer := C_Q2_W + C_GROW;
-  constant C_C_W   : integer := C_CP_W + C_CP2_W + C_CQ_W + C_CQ2_W;
-  constant C_SP_W  : integer := C_P_W + C_NGROW;
-  constant C_SP2_W : integer := C_P2_W + C_NGROW;
-  constant C_SQ_W  : integer := C_P_W + C_NGROW;
-  constant C_SQ2_W : integer := C_Q2_W + C_NGROW;
-  constant C_DEN_W : integer := 2 * G_SAMPLE_W + clog2(C_N * C_N);
+  -- Widths: column sums of l' (r'), x, y; their differences need one more; window sums of l' (r'); numerator and
+  -- denominator, at most n^2 2^(2 G_SAMPLE_W - 1): what leads to them is needed modulo 2^C_DEN_W only.
+  constant C_CL_W  : integer := G_SAMPLE_W + C_GROW;
+  constant C_CX_W  : integer := 2 * G_SAMPLE_W - 1 + C_GROW;
+  constant C_C_W   : integer := 2 * C_CL_W + 2 * C_CX_W;
+  constant C_SL_W  : integer := G_SAMPLE_W + C_NGROW;
+  constant C_DEN_W : integer := 2 * G_SAMPLE_W - 1 + clog2(C_N * C_N);
 
   -- Delay of M rows: one circular buffer, begun anew when M rows have been written, so that it fits any row length.
   constant C_LINE_DEPTH : integer := G_WINDOW * G_MAX_COLS;
@@ -96,84 +95,103 @@ architecture rtl of similarity is
   signal s2_l     : std_logic_vector(G_SAMPLE_W - 1 downto 0);
   signal s2_r     : std_logic_vector(G_SAMPLE_W - 1 downto 0);
   signal s2_line  : std_logic_vector(clog2(C_LINE_DEPTH) - 1 downto 0);
+  signal s2_col   : std_logic_vector(clog2(G_MAX_COLS) - 1 downto 0);
   signal s2_write : std_logic_vector(2 * G_SAMPLE_W - 1 downto 0);
   signal s2_old   : std_logic_vector(2 * G_SAMPLE_W - 1 downto 0);
 
-  -- s3: sum and difference, new and old
+  -- s3: new - old, and what it is multiplied with
   signal s3_valid : std_logic;
   signal s3_col   : std_logic_vector(clog2(G_MAX_COLS) - 1 downto 0);
-  signal s3_p     : unsigned(C_P_W - 1 downto 0);
-  signal s3_q     : signed(C_P_W - 1 downto 0);
-  signal s3_p_old : unsigned(C_P_W - 1 downto 0);
-  signal s3_q_old : signed(C_P_W - 1 downto 0);
+  signal s3_a     : signed(G_SAMPLE_W downto 0);
+  signal s3_c     : signed(G_SAMPLE_W downto 0);
+  signal s3_l     : signed(G_SAMPLE_W - 1 downto 0);
+  signal s3_r     : signed(G_SAMPLE_W - 1 downto 0);
+  signal s3_l_old : signed(G_SAMPLE_W - 1 downto 0);
+  signal s3_r_old : signed(G_SAMPLE_W - 1 downto 0);
 
-  -- s4: new -/+ old; the column sums come out of their RAM
+  -- s4: new + old of l; the column sums come out of their RAM
   signal s4_valid  : std_logic;
   signal s4_first  : std_logic; -- j = 0
-  signal s4_dp     : signed(C_P_W downto 0);
-  signal s4_sp     : signed(C_P_W + 1 downto 0);
-  signal s4_dq     : signed(C_P_W downto 0);
-  signal s4_sq     : signed(C_P_W downto 0);
+  signal s4_a      : signed(G_SAMPLE_W downto 0);
+  signal s4_c      : signed(G_SAMPLE_W downto 0);
+  signal s4_b      : signed(G_SAMPLE_W downto 0);
+  signal s4_r      : signed(G_SAMPLE_W - 1 downto 0);
+  signal s4_l_old  : signed(G_SAMPLE_W - 1 downto 0);
+  signal s4_r_old  : signed(G_SAMPLE_W - 1 downto 0);
   signal s4_column : std_logic_vector(C_C_W - 1 downto 0);
 
-  -- s5: new^2 - old^2; the column sums, 0 in the first row
+  -- s5, s6, s7: column sums with the new sample; before it they are 0 in the first row
   signal s5_valid : std_logic;
-  signal s5_dp    : signed(C_P_W downto 0);
-  signal s5_dq    : signed(C_P_W downto 0);
-  signal s5_dp2   : signed(2 * C_P_W + 2 downto 0);
-  signal s5_dq2   : signed(2 * C_P_W + 1 downto 0);
-  signal s5_cp    : unsigned(C_CP_W - 1 downto 0);
-  signal s5_cp2   : unsigned(C_CP2_W - 1 downto 0);
-  signal s5_cq    : unsigned(C_CQ_W - 1 downto 0);
-  signal s5_cq2   : unsigned(C_CQ2_W - 1 downto 0);
+  signal s5_c     : signed(G_SAMPLE_W downto 0);
+  signal s5_e     : signed(G_SAMPLE_W downto 0); -- new + old of r
+  signal s5_l_old : signed(G_SAMPLE_W - 1 downto 0);
+  signal s5_ar    : signed(2 * G_SAMPLE_W downto 0);
+  signal s5_ab    : signed(2 * G_SAMPLE_W downto 0);
+  signal s5_cl    : signed(C_CL_W - 1 downto 0);
+  signal s5_cr    : signed(C_CL_W - 1 downto 0);
+  signal s5_cx    : signed(C_CX_W - 1 downto 0);
+  signal s5_cy    : signed(C_CX_W - 1 downto 0); -- modulo 2^C_CX_W, as are s6_cy and s7_cy, never below 0
+  signal s6_valid : std_logic;
+  signal s6_lc    : signed(2 * G_SAMPLE_W downto 0);
+  signal s6_ce    : signed(2 * G_SAMPLE_W downto 0);
+  signal s6_cl    : signed(C_CL_W - 1 downto 0);
+  signal s6_cr    : signed(C_CL_W - 1 downto 0);
+  signal s6_cx    : signed(C_CX_W - 1 downto 0);
+  signal s6_cy    : signed(C_CX_W - 1 downto 0);
+  signal s7_valid : std_logic;
+  signal s7_col   : std_logic_vector(clog2(G_MAX_COLS) - 1 downto 0);
+  signal s7_cl    : signed(C_CL_W - 1 downto 0);
+  signal s7_cr    : signed(C_CL_W - 1 downto 0);
+  signal s7_cx    : signed(C_CX_W - 1 downto 0);
+  signal s7_cy    : signed(C_CX_W - 1 downto 0);
+  signal s7_column : std_logic_vector(C_C_W - 1 downto 0);
 
-  -- s6: column sums with the new sample; all sums modulo their width, so the sign of q needs no care
-  signal s6_valid  : std_logic;
-  signal s6_wide   : std_logic;
-  signal s6_col    : std_logic_vector(clog2(G_MAX_COLS) - 1 downto 0);
-  signal s6_cp     : unsigned(C_CP_W - 1 downto 0);
-  signal s6_cp2    : unsigned(C_CP2_W - 1 downto 0);
-  signal s6_cq     : unsigned(C_CQ_W - 1 downto 0);
-  signal s6_cq2    : unsigned(C_CQ2_W - 1 downto 0);
-  signal s6_column : std_logic_vector(C_C_W - 1 downto 0);
-  signal s6_left   : std_logic_vector(C_C_W - 1 downto 0); -- of the column that leaves the window, M columns back
+  -- Columns that leave the window, M columns back. Sums of l' and r' go ahead of those of x and y by one clock.
+  signal s6_wide    : std_logic;
+  signal s6_lr      : std_logic_vector(2 * C_CL_W - 1 downto 0);
+  signal s6_lr_left : std_logic_vector(2 * C_CL_W - 1 downto 0);
+  signal s7_wide    : std_logic;
+  signal s7_xy_left : std_logic_vector(2 * C_CX_W - 1 downto 0);
+  signal s7_flags   : std_logic_vector(1 downto 0);
 
-  -- s7: new column - column that leaves
-  signal s7_valid     : std_logic;
-  signal s7_row_first : std_logic;
-  signal s7_dp        : signed(C_CP_W downto 0);
-  signal s7_dp2       : signed(C_CP2_W downto 0);
-  signal s7_dq        : signed(C_CQ_W downto 0);
-  signal s7_dq2       : signed(C_CQ2_W downto 0);
+  -- s7, s8: new column - column that leaves; the other way round for x and y, because a constant factor below 0 would
+  -- be converted wrongly. s8: window sums of l' and r'
+  signal s7_dl        : signed(C_CL_W downto 0);
+  signal s7_dr        : signed(C_CL_W downto 0);
+  signal s8_valid     : std_logic;
+  signal s8_flags     : std_logic_vector(1 downto 0);
+  signal s8_dx        : signed(C_CX_W downto 0);
+  signal s8_dy        : signed(C_CX_W downto 0);
+  signal s8_l         : signed(C_SL_W - 1 downto 0);
+  signal s8_r         : signed(C_SL_W - 1 downto 0);
 
-  -- s8: window sums
-  signal s8_valid : std_logic;
-  signal s8_cell  : std_logic;
-  signal s8_sp    : signed(C_SP_W downto 0);
-  signal s8_sp2   : unsigned(C_SP2_W - 1 downto 0);
-  signal s8_sq    : signed(C_SQ_W - 1 downto 0);
-  signal s8_sq2   : unsigned(C_SQ2_W - 1 downto 0);
+  -- s9: differences of x and y times n
+  signal s9_valid     : std_logic;
+  signal s9_cell      : std_logic;
+  signal s9_row_first : std_logic;
+  signal s9_l         : signed(C_SL_W - 1 downto 0);
+  signal s9_r         : signed(C_SL_W - 1 downto 0);
+  signal s9_n_dx      : signed(C_CX_W + C_NGROW + 1 downto 0);
+  signal s9_n_dy      : signed(C_CX_W + C_NGROW + 1 downto 0);
 
-  -- s9, s10: products (two stages, for the registers inside DSP slices)
-  signal s9_valid  : std_logic;
-  signal s9_n_sp2  : unsigned(C_DEN_W - 1 downto 0);
-  signal s9_sp_2   : unsigned(C_DEN_W - 1 downto 0);
-  signal s9_n_sq2  : unsigned(C_DEN_W - 1 downto 0);
-  signal s9_sq_2   : unsigned(C_DEN_W - 1 downto 0);
+  -- s10: -n S(x), -n S(y) - 1
   signal s10_valid : std_logic;
-  signal s10_n_sp2 : unsigned(C_DEN_W - 1 downto 0);
-  signal s10_sp_2  : unsigned(C_DEN_W - 1 downto 0);
-  signal s10_n_sq2 : unsigned(C_DEN_W - 1 downto 0);
-  signal s10_sq_2  : unsigned(C_DEN_W - 1 downto 0);
+  signal s10_l     : signed(C_SL_W - 1 downto 0);
+  signal s10_r     : signed(C_SL_W - 1 downto 0);
+  signal s10_ll    : signed(2 * C_SL_W - 1 downto 0);
+  signal s10_x     : signed(C_DEN_W - 1 downto 0);
+  signal s10_y     : signed(C_DEN_W - 1 downto 0);
 
-  -- s11: A and B; s12: A + B and A - B
-  signal s11_valid : std_logic;
-  signal s11_a     : unsigned(C_DEN_W - 1 downto 0);
-  signal s11_b     : unsigned(C_DEN_W - 1 downto 0);
-  signal s12_valid : std_logic;
+  -- s11, s12: half the numerator, S(l) S(r) - n S(x); S(l)^2 + S(r)^2 - n S(y) - 1, which is the denominator inverted
+  signal s11_valid  : std_logic;
+  signal s11_lr     : signed(2 * C_SL_W - 1 downto 0);
+  signal s11_rr     : signed(2 * C_SL_W - 1 downto 0);
+  signal s11_x      : signed(C_DEN_W - 1 downto 0);
+  signal s11_y      : signed(C_DEN_W - 1 downto 0);
+  signal s12_valid  : std_logic;
   signal s12_inside : std_logic;
-  signal s12_num   : unsigned(C_DEN_W downto 0); -- A - B, two's complement
-  signal s12_den   : unsigned(C_DEN_W - 1 downto 0);
+  signal s12_half   : signed(C_DEN_W - 1 downto 0);
+  signal s12_nden   : signed(C_DEN_W - 1 downto 0);
 
   -- s13, s14, s15: shifted left by a multiple of 16, of 4, of 1, until the leading one of den is on top
   signal s13_valid    : std_logic;
@@ -193,7 +211,6 @@ architecture rtl of similarity is
   signal div_quot     : std_logic_vector(G_MNCC_W - 1 downto 0);
   signal div_textured : std_logic_vector(0 downto 0);
   signal flags_out    : std_logic_vector(1 downto 0);
-  signal s7_flags     : std_logic_vector(1 downto 0);
 
   -- One usable flag more: the run goes on up to M, or breaks.
   function next_run (run : unsigned; usable : std_logic; restart : std_logic) return unsigned is
@@ -218,6 +235,29 @@ architecture rtl of similarity is
     v_all(width - 1 downto width - high'length) := high;
     return v_all;
   end function fill_low;
+
+  -- A left sample less half its range: the same bits with the top one inverted.
+  function centred (sample : std_logic_vector) return signed is
+    variable v_word : std_logic_vector(sample'length - 1 downto 0);
+  begin
+    v_word := sample;
+    v_word(v_word'high) := not v_word(v_word'high);
+    return signed(v_word);
+  end function centred;
+
+  -- -1 less that, of a right sample.
+  function mirrored (sample : std_logic_vector) return signed is
+  begin
+    return not centred(sample);
+  end function mirrored;
+
+  -- `number` modulo 2^width, where numeric_std's resize would keep the sign.
+  function fit (number : signed; width : positive) return signed is
+    variable v_wide : signed(imax(width, number'length) - 1 downto 0);
+  begin
+    v_wide := resize(number, v_wide'length);
+    return v_wide(width - 1 downto 0);
+  end function fit;
 
 begin
 
@@ -347,8 +387,6 @@ begin
       m_data    => flags_out
     );
 
-  s7_row_first <= s7_flags(0);
-
   -- s2: delay of M rows ----------------------------------------------------------------------------------------------
   -- A word is read one clock before it is replaced: the buffer holds exactly M rows.
   s2_write <= s2_r & s2_l;
@@ -376,35 +414,24 @@ begin
       s2_l     <= s1_l;
       s2_r     <= s1_r;
       s2_line  <= std_logic_vector(s1_line);
+      s2_col   <= std_logic_vector(s1_col);
       if rst = '1' then
         s2_valid <= '0';
       end if;
     end if;
   end process p_s2;
 
-  -- s3 - s6: column sums ---------------------------------------------------------------------------------------------
-  u_col_s3 : entity work.delay_line
+  -- s3 - s7: column sums ---------------------------------------------------------------------------------------------
+  u_col : entity work.delay_line
     generic map (
       G_DATA_W => clog2(G_MAX_COLS),
-      G_DELAY  => 2
-    )
-    port map (
-      clk    => clk,
-      ce     => '1',
-      s_data => std_logic_vector(s1_col),
-      m_data => s3_col
-    );
-
-  u_col_s6 : entity work.delay_line
-    generic map (
-      G_DATA_W => clog2(G_MAX_COLS),
-      G_DELAY  => 3
+      G_DELAY  => 4
     )
     port map (
       clk    => clk,
       ce     => '1',
       s_data => s3_col,
-      m_data => s6_col
+      m_data => s7_col
     );
 
   u_columns : entity work.ram_sdp
@@ -415,154 +442,201 @@ begin
     )
     port map (
       clk   => clk,
-      we    => s6_valid,
-      waddr => s6_col,
-      wdata => s6_column,
+      we    => s7_valid,
+      waddr => s7_col,
+      wdata => s7_column,
       raddr => s3_col,
       rdata => s4_column
     );
 
   p_columns : process (clk)
+    variable v_l     : signed(G_SAMPLE_W - 1 downto 0);
+    variable v_r     : signed(G_SAMPLE_W - 1 downto 0);
+    variable v_l_old : signed(G_SAMPLE_W - 1 downto 0);
+    variable v_r_old : signed(G_SAMPLE_W - 1 downto 0);
+    variable v_cl    : signed(C_CL_W - 1 downto 0);
+    variable v_cr    : signed(C_CL_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       -- s3
       s3_valid <= s2_valid;
-      s3_p     <= resize(unsigned(s2_l), C_P_W) + resize(unsigned(s2_r), C_P_W);
-      s3_q     <= signed('0' & s2_l) - signed('0' & s2_r);
-      s3_p_old <= resize(unsigned(s2_old(G_SAMPLE_W - 1 downto 0)), C_P_W)
-                  + resize(unsigned(s2_old(2 * G_SAMPLE_W - 1 downto G_SAMPLE_W)), C_P_W);
-      s3_q_old <= signed('0' & s2_old(G_SAMPLE_W - 1 downto 0))
-                  - signed('0' & s2_old(2 * G_SAMPLE_W - 1 downto G_SAMPLE_W));
+      s3_col   <= s2_col;
+      v_l      := centred(s2_l);
+      v_r      := mirrored(s2_r);
+      v_l_old  := centred(s2_old(G_SAMPLE_W - 1 downto 0));
+      v_r_old  := mirrored(s2_old(2 * G_SAMPLE_W - 1 downto G_SAMPLE_W));
       if s2_warm = '0' then
-        s3_p_old <= (others => '0');
-        s3_q_old <= (others => '0');
+        v_l_old := (others => '0');
+        v_r_old := (others => '0');
       end if;
+      s3_l     <= v_l;
+      s3_r     <= v_r;
+      s3_l_old <= v_l_old;
+      s3_r_old <= v_r_old;
+      s3_a     <= resize(v_l, G_SAMPLE_W + 1) - resize(v_l_old, G_SAMPLE_W + 1);
+      s3_c     <= resize(v_r, G_SAMPLE_W + 1) - resize(v_r_old, G_SAMPLE_W + 1);
       -- s4
       s4_valid <= s3_valid;
-      s4_dp    <= signed('0' & s3_p) - signed('0' & s3_p_old);
-      s4_sp    <= signed("00" & s3_p) + signed("00" & s3_p_old);
-      s4_dq    <= resize(s3_q, C_P_W + 1) - resize(s3_q_old, C_P_W + 1);
-      s4_sq    <= resize(s3_q, C_P_W + 1) + resize(s3_q_old, C_P_W + 1);
+      s4_a     <= s3_a;
+      s4_c     <= s3_c;
+      s4_r     <= s3_r;
+      s4_l_old <= s3_l_old;
+      s4_r_old <= s3_r_old;
+      s4_b     <= resize(s3_l, G_SAMPLE_W + 1) + resize(s3_l_old, G_SAMPLE_W + 1);
       -- s5
       s5_valid <= s4_valid;
-      s5_dp    <= s4_dp;
-      s5_dq    <= s4_dq;
-      s5_dp2   <= s4_dp * s4_sp;
-      s5_dq2   <= s4_dq * s4_sq;
-      s5_cp    <= unsigned(s4_column(C_CP_W - 1 downto 0));
-      s5_cp2   <= unsigned(s4_column(C_CP_W + C_CP2_W - 1 downto C_CP_W));
-      s5_cq    <= unsigned(s4_column(C_CP_W + C_CP2_W + C_CQ_W - 1 downto C_CP_W + C_CP2_W));
-      s5_cq2   <= unsigned(s4_column(C_C_W - 1 downto C_CP_W + C_CP2_W + C_CQ_W));
+      s5_c     <= s4_c;
+      s5_l_old <= s4_l_old;
+      s5_e     <= resize(s4_r, G_SAMPLE_W + 1) + resize(s4_r_old, G_SAMPLE_W + 1);
+      s5_ar    <= s4_a * s4_r;
+      s5_ab    <= fit(s4_b * s4_a, 2 * G_SAMPLE_W + 1);
+      v_cl     := signed(s4_column(C_CL_W - 1 downto 0));
+      v_cr     := signed(s4_column(2 * C_CL_W - 1 downto C_CL_W));
+      s5_cx    <= signed(s4_column(2 * C_CL_W + C_CX_W - 1 downto 2 * C_CL_W));
+      s5_cy    <= signed(s4_column(C_C_W - 1 downto 2 * C_CL_W + C_CX_W));
       if s4_first = '1' then
-        s5_cp  <= (others => '0');
-        s5_cp2 <= (others => '0');
-        s5_cq  <= (others => '0');
-        s5_cq2 <= (others => '0');
+        v_cl  := (others => '0');
+        v_cr  := (others => '0');
+        s5_cx <= (others => '0');
+        s5_cy <= (others => '0');
       end if;
-      -- s6: |new^2 - old^2| is less than 2^(2 C_P_W) and 2^C_Q2_W; the bits above repeat the sign
+      s5_cl <= v_cl + resize(s4_a, C_CL_W);
+      s5_cr <= v_cr + resize(s4_c, C_CL_W);
+      -- s6
       s6_valid <= s5_valid;
-      s6_cp    <= s5_cp + unsigned(resize(s5_dp, C_CP_W));
-      s6_cp2   <= s5_cp2 + unsigned(resize(s5_dp2(2 * C_P_W downto 0), C_CP2_W));
-      s6_cq    <= s5_cq + unsigned(resize(s5_dq, C_CQ_W));
-      s6_cq2   <= s5_cq2 + unsigned(resize(s5_dq2(C_Q2_W downto 0), C_CQ2_W));
+      s6_lc    <= s5_c * s5_l_old;
+      s6_ce    <= fit(s5_e * s5_c, 2 * G_SAMPLE_W + 1);
+      s6_cl    <= s5_cl;
+      s6_cr    <= s5_cr;
+      s6_cx    <= s5_cx + fit(s5_ar, C_CX_W);
+      s6_cy    <= s5_cy + fit(s5_ab, C_CX_W);
+      -- s7
+      s7_valid <= s6_valid;
+      s7_cl    <= s6_cl;
+      s7_cr    <= s6_cr;
+      s7_cx    <= s6_cx + fit(s6_lc, C_CX_W);
+      s7_cy    <= s6_cy + fit(s6_ce, C_CX_W);
       if rst = '1' then
         s3_valid <= '0';
         s4_valid <= '0';
         s5_valid <= '0';
         s6_valid <= '0';
+        s7_valid <= '0';
       end if;
     end if;
   end process p_columns;
 
-  s6_column <= std_logic_vector(s6_cq2) & std_logic_vector(s6_cq) & std_logic_vector(s6_cp2) & std_logic_vector(s6_cp);
+  s7_column <= std_logic_vector(s7_cy) & std_logic_vector(s7_cx) & std_logic_vector(s7_cr) & std_logic_vector(s7_cl);
 
-  -- s7, s8: window sums ----------------------------------------------------------------------------------------------
-  u_leaving : entity work.delay_line
+  -- s7 - s10: window sums ----------------------------------------------------------------------------------------------
+  s6_lr <= std_logic_vector(s6_cr) & std_logic_vector(s6_cl);
+
+  u_leaving_lr : entity work.delay_line
     generic map (
-      G_DATA_W => C_C_W,
+      G_DATA_W => 2 * C_CL_W,
       G_DELAY  => G_WINDOW
     )
     port map (
       clk    => clk,
       ce     => s6_valid,
-      s_data => s6_column,
-      m_data => s6_left
+      s_data => s6_lr,
+      m_data => s6_lr_left
+    );
+
+  u_leaving_xy : entity work.delay_line
+    generic map (
+      G_DATA_W => 2 * C_CX_W,
+      G_DELAY  => G_WINDOW
+    )
+    port map (
+      clk    => clk,
+      ce     => s7_valid,
+      s_data => s7_column(C_C_W - 1 downto 2 * C_CL_W),
+      m_data => s7_xy_left
     );
 
   p_window : process (clk)
-    variable v_left : std_logic_vector(C_C_W - 1 downto 0);
+    variable v_lr : std_logic_vector(2 * C_CL_W - 1 downto 0);
+    variable v_xy : std_logic_vector(2 * C_CX_W - 1 downto 0);
+    variable v_l  : signed(C_SL_W - 1 downto 0);
+    variable v_r  : signed(C_SL_W - 1 downto 0);
+    variable v_x  : signed(C_DEN_W - 1 downto 0);
+    variable v_y  : signed(C_DEN_W - 1 downto 0);
   begin
     if rising_edge(clk) then
-      -- s7: q's column sum is signed, the other three are not
-      s7_valid <= s6_valid;
-      v_left   := s6_left;
+      -- s7
+      s7_wide <= s6_wide;
+      v_lr    := s6_lr_left;
       if s6_wide = '0' then
-        v_left := (others => '0');
+        v_lr := (others => '0');
       end if;
-      s7_dp  <= signed('0' & s6_cp) - signed('0' & v_left(C_CP_W - 1 downto 0));
-      s7_dp2 <= signed('0' & s6_cp2) - signed('0' & v_left(C_CP_W + C_CP2_W - 1 downto C_CP_W));
-      s7_dq  <= resize(signed(s6_cq), C_CQ_W + 1)
-                - resize(signed(v_left(C_CP_W + C_CP2_W + C_CQ_W - 1 downto C_CP_W + C_CP2_W)), C_CQ_W + 1);
-      s7_dq2 <= signed('0' & s6_cq2) - signed('0' & v_left(C_C_W - 1 downto C_CP_W + C_CP2_W + C_CQ_W));
-      -- s8: sp has a leading 0, so that it multiplies as a signed number
+      s7_dl <= resize(s6_cl, C_CL_W + 1) - resize(signed(v_lr(C_CL_W - 1 downto 0)), C_CL_W + 1);
+      s7_dr <= resize(s6_cr, C_CL_W + 1) - resize(signed(v_lr(2 * C_CL_W - 1 downto C_CL_W)), C_CL_W + 1);
+      -- s8
       s8_valid <= s7_valid;
-      s8_cell  <= s7_flags(1);
+      s8_flags <= s7_flags;
+      v_xy     := s7_xy_left;
+      if s7_wide = '0' then
+        v_xy := (others => '0');
+      end if;
+      s8_dx <= resize(signed(v_xy(C_CX_W - 1 downto 0)), C_CX_W + 1) - resize(s7_cx, C_CX_W + 1);
+      s8_dy <= signed('0' & v_xy(2 * C_CX_W - 1 downto C_CX_W)) - signed('0' & s7_cy);
       if s7_valid = '1' then
-        if s7_row_first = '1' then
-          s8_sp  <= resize(s7_dp, C_SP_W + 1);
-          s8_sp2 <= unsigned(resize(s7_dp2, C_SP2_W));
-          s8_sq  <= resize(s7_dq, C_SQ_W);
-          s8_sq2 <= unsigned(resize(s7_dq2, C_SQ2_W));
-        else
-          s8_sp  <= s8_sp + resize(s7_dp, C_SP_W + 1);
-          s8_sp2 <= s8_sp2 + unsigned(resize(s7_dp2, C_SP2_W));
-          s8_sq  <= s8_sq + resize(s7_dq, C_SQ_W);
-          s8_sq2 <= s8_sq2 + unsigned(resize(s7_dq2, C_SQ2_W));
+        v_l := s8_l;
+        v_r := s8_r;
+        if s7_flags(0) = '1' then
+          v_l := (others => '0');
+          v_r := (others => '0');
         end if;
+        s8_l <= v_l + resize(s7_dl, C_SL_W);
+        s8_r <= v_r + resize(s7_dr, C_SL_W);
+      end if;
+      -- s9
+      s9_valid     <= s8_valid;
+      s9_cell      <= s8_flags(1);
+      s9_row_first <= s8_flags(0);
+      s9_l         <= s8_l;
+      s9_r         <= s8_r;
+      s9_n_dx      <= s8_dx * to_signed(C_N, C_NGROW + 1);
+      s9_n_dy      <= s8_dy * to_signed(C_N, C_NGROW + 1);
+      -- s10
+      s10_valid <= s9_valid and s9_cell;
+      s10_l     <= s9_l;
+      s10_r     <= s9_r;
+      s10_ll    <= s9_l * s9_l;
+      if s9_valid = '1' then
+        v_x := s10_x;
+        v_y := s10_y;
+        if s9_row_first = '1' then
+          v_x := (others => '0');
+          v_y := (others => s9_row_first); -- ones; as a constant of this width they would be converted wrongly
+        end if;
+        s10_x <= v_x + fit(s9_n_dx, C_DEN_W);
+        s10_y <= v_y + fit(s9_n_dy, C_DEN_W);
       end if;
       if rst = '1' then
-        s7_valid <= '0';
         s8_valid <= '0';
+        s9_valid <= '0';
+        s10_valid <= '0';
       end if;
     end if;
   end process p_window;
 
-  -- s9 - s12: numerator and denominator ------------------------------------------------------------------------------
-  -- A, B and A + B fit C_DEN_W bits, so their parts are needed modulo 2^C_DEN_W only.
+  -- s11, s12: numerator and denominator ------------------------------------------------------------------------------
   p_fraction : process (clk)
-    variable v_n_sp2 : unsigned(C_SP2_W + C_NGROW - 1 downto 0);
-    variable v_n_sq2 : unsigned(C_SQ2_W + C_NGROW - 1 downto 0);
-    variable v_sp_2  : signed(2 * C_SP_W + 1 downto 0);
-    variable v_sq_2  : signed(2 * C_SQ_W - 1 downto 0);
   begin
     if rising_edge(clk) then
-      -- s9
-      s9_valid <= s8_valid and s8_cell;
-      v_n_sp2  := s8_sp2 * to_unsigned(C_N, C_NGROW);
-      v_n_sq2  := s8_sq2 * to_unsigned(C_N, C_NGROW);
-      v_sp_2   := s8_sp * s8_sp;
-      v_sq_2   := s8_sq * s8_sq;
-      s9_n_sp2 <= resize(v_n_sp2, C_DEN_W);
-      s9_n_sq2 <= resize(v_n_sq2, C_DEN_W);
-      s9_sp_2  <= resize(unsigned(v_sp_2), C_DEN_W);
-      s9_sq_2  <= resize(unsigned(v_sq_2), C_DEN_W);
-      -- s10
-      s10_valid <= s9_valid;
-      s10_n_sp2 <= s9_n_sp2;
-      s10_n_sq2 <= s9_n_sq2;
-      s10_sp_2  <= s9_sp_2;
-      s10_sq_2  <= s9_sq_2;
       -- s11
       s11_valid <= s10_valid;
-      s11_a     <= s10_n_sp2 - s10_sp_2;
-      s11_b     <= s10_n_sq2 - s10_sq_2;
+      s11_x     <= s10_x;
+      s11_lr    <= s10_l * s10_r;
+      s11_y     <= s10_y + fit(s10_ll, C_DEN_W);
+      s11_rr    <= s10_r * s10_r;
       -- s12
       s12_valid <= s11_valid;
-      s12_num   <= resize(s11_a, C_DEN_W + 1) - resize(s11_b, C_DEN_W + 1);
-      s12_den   <= s11_a + s11_b;
+      s12_half  <= s11_x + fit(s11_lr, C_DEN_W);
+      s12_nden  <= s11_y + fit(s11_rr, C_DEN_W);
       if rst = '1' then
-        s9_valid  <= '0';
-        s10_valid <= '0';
         s11_valid <= '0';
         s12_valid <= '0';
       end if;
@@ -579,9 +653,9 @@ begin
     if rising_edge(clk) then
       -- s13
       s13_valid       <= s12_valid;
-      s13_textured(0) <= s12_inside and to_bit(s12_den /= 0);
-      v_num           := fill_low(s12_num(C_DEN_W - 1 downto 0), 64);
-      v_den           := fill_low(s12_den, 64);
+      v_num           := fill_low(unsigned(s12_half(C_DEN_W - 2 downto 0)) & '0', 64);
+      v_den           := fill_low(unsigned(not s12_nden), 64);
+      s13_textured(0) <= s12_inside and to_bit(v_den /= 0);
       v_low_num       := v_num(31 downto 0) & to_unsigned(0, 32);
       v_low_den       := v_den(31 downto 0) & to_unsigned(0, 32);
       if v_den(63 downto 48) /= 0 then
@@ -597,7 +671,7 @@ begin
         s13_num <= v_low_num(47 downto 33 - C_NORM);
         s13_den <= v_low_den(47 downto 33 - C_NORM);
       end if;
-      if s12_num(C_DEN_W) = '1' then
+      if s12_half(C_DEN_W - 1) = '1' then
         s13_num <= (others => '0');
       end if;
       -- s14
@@ -687,7 +761,9 @@ begin
   -- synthesis translate_off
   -- Rules, in simulators.
   p_rules : process (clk)
-    variable v_gap : natural := C_ROW_MIN; -- clocks since the strobe of a row, at most C_ROW_MIN
+    variable v_gap  : natural := C_ROW_MIN; -- clocks since the strobe of a row, at most C_ROW_MIN
+    variable v_den  : unsigned(C_DEN_W downto 0);
+    variable v_half : unsigned(C_DEN_W downto 0);
   begin
     if rising_edge(clk) then
       if s_valid = '1' and s_row_first = '1' then
@@ -705,23 +781,28 @@ begin
       assert s4_valid /= '1' or s4_first = '1' or not is_x(s4_column)
         report "similarity: the sums of a column are unknown: never written, or read in the clock of their write"
         severity failure;
-      if s8_valid = '1' and s8_cell = '1' then
-        assert s8_sp >= 0 and s8_sp <= C_N * (2 ** C_P_W - 2)
-          report "similarity: the sum of p is out of range"
+      if s8_valid = '1' and s8_flags(1) = '1' then
+        assert s8_l >= -C_N * 2 ** (G_SAMPLE_W - 1) and s8_l < C_N * 2 ** (G_SAMPLE_W - 1)
+          report "similarity: the sum of l is out of range"
           severity failure;
-        assert s8_sq >= -C_N * (2 ** G_SAMPLE_W - 1) and s8_sq <= C_N * (2 ** G_SAMPLE_W - 1)
-          report "similarity: the sum of q is out of range"
+        assert s8_r >= -C_N * 2 ** (G_SAMPLE_W - 1) and s8_r < C_N * 2 ** (G_SAMPLE_W - 1)
+          report "similarity: the sum of r is out of range"
           severity failure;
       end if;
-      if s11_valid = '1' then
-        -- Sums are kept modulo their width: a carry here would be one that is lost.
-        assert ('0' & s11_a) + ('0' & s11_b) = '0' & (s11_a + s11_b)
-          report "similarity: A + B overflows"
+      if s12_valid = '1' then
+        -- 2 |cov| <= var + var. Sums are kept modulo their width, so this tells a lost carry, too.
+        v_den  := resize(unsigned(not s12_nden), C_DEN_W + 1);
+        v_half := unsigned(s12_half(C_DEN_W - 1) & s12_half);
+        if s12_half(C_DEN_W - 1) = '1' then
+          v_half := 0 - v_half;
+        end if;
+        assert v_half(C_DEN_W - 1 downto 0) & '0' <= v_den
+          report "similarity: the covariance is larger than the variances allow"
           severity failure;
       end if;
       if s15_valid = '1' then
         assert s15_num <= s15_den and (s15_den = 0 or s15_den(C_NORM - 1) = '1')
-          report "similarity: the quotient's operands are not normalised, or A - B > A + B"
+          report "similarity: the quotient's operands are not normalised, or its numerator is the larger one"
           severity failure;
       end if;
     end if;

@@ -47,7 +47,7 @@ inline PlaneTrace sweep_plane(const Config& c, const TileJob& t, const PlaneEntr
       auto accumulate = [](Sums& s, int l, int r, int sign) {
         Sums d;
         d.add(l, r);
-        s.p += sign * d.p, s.p2 += sign * d.p2, s.q += sign * d.q, s.q2 += sign * d.q2;
+        s.add(d, sign);
       };
       accumulate(column[i], out.l[at], out.r[at], 1);
       column_usable[i] += out.flags[at].usable;
@@ -57,8 +57,7 @@ inline PlaneTrace sweep_plane(const Config& c, const TileJob& t, const PlaneEntr
         column_usable[i] -= out.flags[old].usable;
       }
       auto add_column = [&](int k, int sign) {
-        window.p += sign * column[k].p, window.p2 += sign * column[k].p2;
-        window.q += sign * column[k].q, window.q2 += sign * column[k].q2;
+        window.add(column[k], sign);
         window_usable += sign * column_usable[k];
       };
       add_column(i, 1);

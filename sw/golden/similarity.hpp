@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bit-true model of entity similarity: MNCC over M x M windows (paper, equation 1) in the sum/difference form.
-//   p = l + r, q = l - r, n = M*M, A = n S(p^2) - (S p)^2, B = n S(q^2) - (S q)^2   (exact integers)
-//   MNCC = 2 cov(l,r) / (var(l) + var(r)) = (A - B) / (A + B)
-// The entity keeps vertical sums of M rows per column and a horizontal running sum of M columns; being exact integers
-// they equal the plain sums below.
+// Bit-true model of entity similarity: MNCC over M x M windows (paper, equation 1).
+//   MNCC = 2 cov(l,r) / (var(l) + var(r)) = 2 (n S(lr) - S(l) S(r)) / (n S(l^2 + r^2) - S(l)^2 - S(r)^2), n = M*M
+// The entity keeps vertical sums of M rows per column and a horizontal running sum of M columns, of samples less an
+// offset and mirrored; all being exact integers, its numerator and denominator equal the plain ones below.
 #pragma once
 #include "golden/config.hpp"
 
@@ -12,19 +11,28 @@ namespace psweep::golden {
 struct Similarity {
   int v = 0;              // ufix(0,mncc_bits), 0 .. 2^mncc_bits - 1; negative correlation is 0
   bool valid = false;     // all M*M samples of the window are usable
-  bool textured = false;  // valid and A + B > 0
+  bool textured = false;  // valid and var(l) + var(r) > 0
 };
 
-// The four window sums.
+// The four sums of a window or of one of its columns: l, r, l r, l^2 + r^2.
 struct Sums {
-  int64_t p = 0, p2 = 0, q = 0, q2 = 0;
-  void add(int l, int r) {
-    const int64_t sp = l + r, sq = l - r;
-    p += sp;
-    p2 += sp * sp;
-    q += sq;
-    q2 += sq * sq;
+  int64_t l = 0, r = 0, x = 0, y = 0;
+  void add(int64_t left, int64_t right) {
+    l += left;
+    r += right;
+    x += left * right;
+    y += left * left + right * right;
   }
+  // Adds `sign` times the other sums.
+  void add(const Sums& other, int sign) {
+    l += sign * other.l;
+    r += sign * other.r;
+    x += sign * other.x;
+    y += sign * other.y;
+  }
+  // n^2 cov and n^2 (var + var) of n samples.
+  int64_t covariance(int64_t n) const { return n * x - l * r; }
+  int64_t variances(int64_t n) const { return n * y - l * l - r * r; }
 };
 
 // Restoring division, one quotient bit a step: floor(num * 2^bits / den), which is all ones when num >= den.
@@ -59,10 +67,8 @@ inline void normalise(int64_t& num, int64_t& den, int norm_bits) {
 
 inline Similarity mncc(const Config& c, const Sums& s, bool valid) {
   const int64_t n = static_cast<int64_t>(c.window) * c.window;
-  const int64_t a = n * s.p2 - s.p * s.p;
-  const int64_t b = n * s.q2 - s.q * s.q;
-  int64_t num = a - b;
-  int64_t den = a + b;
+  int64_t num = 2 * s.covariance(n);
+  int64_t den = s.variances(n);
   Similarity out;
   out.valid = valid;
   out.textured = valid && den > 0;

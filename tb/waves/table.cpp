@@ -141,13 +141,14 @@ std::vector<TableRow> compare_cell(const Capture& c, const tb::Stimulus& stimulu
 
   enter("similarity", "u_similarity", true, kInterpolationOut, false);
   golden::Sums sums;
+  const int64_t half = int64_t{1} << (config.sample_bits() - 1);
   int64_t equal = 0;
   const std::vector<uint64_t> clocks = window_clocks(c);
   for (int dj = 0; dj < m; ++dj) {
     for (int di = 0; di < m; ++di) {
       const size_t here = static_cast<size_t>(c.cell.row + dj) * cols + static_cast<size_t>(c.cell.column + di);
       const uint64_t clock = clocks[static_cast<size_t>(dj * m + di)];
-      sums.add(trace.l[here], trace.r[here]);
+      sums.add(trace.l[here] - half, half - 1 - trace.r[here]);
       equal += probe.at(module, true, "s_l", clock) == trace.l[here] &&
                probe.at(module, true, "s_r", clock) == trace.r[here];
     }
@@ -157,15 +158,17 @@ std::vector<TableRow> compare_cell(const Capture& c, const tb::Stimulus& stimulu
   samples.golden = static_cast<int64_t>(m) * m;
   samples.rtl = equal;
   rows.push_back(samples);
-  const int64_t n = samples.golden, a = n * sums.p2 - sums.p * sums.p, b = n * sums.q2 - sums.q * sums.q;
-  add("sum of l+r", "s8_sp", 8, sums.p, {-1, false, true, true});
-  add("sum of (l+r)^2", "s8_sp2", 8, sums.p2, {});
-  add("sum of l-r", "s8_sq", 8, sums.q, {-1, false, true, true});
-  add("sum of (l-r)^2", "s8_sq2", 8, sums.q2, {});
-  add("A", "s11_a", 11, a, {});
-  add("B", "s11_b", 11, b, {});
-  add("A - B", "s12_num", 12, a - b, {-1, false, true, true});
-  add("A + B", "s12_den", 12, a + b, {});
+  // As the entity sees them: left less half the range, right mirrored, so that the covariance changes its sign.
+  const int64_t n = samples.golden;
+  add("sum of l'", "s8_l", 8, sums.l, {-1, false, true, true});
+  add("sum of r'", "s8_r", 8, sums.r, {-1, false, true, true});
+  add("-n sum of l' r'", "s10_x", 10, -n * sums.x, {-1, false, true, true});
+  // Modulo 2^bits, bits those of n^2 (var + var): the entity needs no more of it.
+  int bits = 2 * config.sample_bits() - 1;
+  while ((int64_t{1} << bits) < (n * n << (2 * config.sample_bits() - 1))) ++bits;
+  add("-n sum of l'^2 + r'^2, - 1", "s10_y", 10, (-n * sums.y - 1) & ((int64_t{1} << bits) - 1), {});
+  add("n^2 cov", "s12_half", 12, -sums.covariance(n), {-1, false, true, true});
+  add("-n^2 (var + var) - 1", "s12_nden", 12, -sums.variances(n) - 1, {-1, false, true, true});
   const golden::Similarity s = similarity_of(c, trace);
   base = c.here[kSimilarityOut];
   add("inside", "m_inside", 0, s.valid, {});
