@@ -12,7 +12,7 @@
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
 --   Rate    : one sample per clock; cells leave in raster order
 --   Latency : similarity_latency(G_MNCC_W) clocks from the last sample of a window to its cell (psweep_pkg)
---   Numbers : samples ufix(G_SAMPLE_W,0); all sums exact; operands of the division truncated to G_MNCC_W+3 bits with the
+--   Numbers : samples ufix(G_SAMPLE_W,0); all sums exact; operands of the division truncated to G_MNCC_W+3 bits, the
 --             denominator's leading one on top; V ufix(0,G_MNCC_W) truncated, 0 where cov <= 0, both flat or outside
 --   Rows    : any length from G_WINDOW to G_MAX_COLS, the same for all rows of a plane; a row takes at least C_ROW_MIN
 --             clocks, which is what the loop through the column sums needs
@@ -528,7 +528,7 @@ begin
 
   s7_column <= std_logic_vector(s7_cy) & std_logic_vector(s7_cx) & std_logic_vector(s7_cr) & std_logic_vector(s7_cl);
 
-  -- s7 - s10: window sums ----------------------------------------------------------------------------------------------
+  -- s7 - s10: window sums ---------------------------------------------------------------------------------------------
   s6_lr <= std_logic_vector(s6_cr) & std_logic_vector(s6_cl);
 
   u_leaving_lr : entity work.delay_line
