@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Clocks, crossings and MII of psweep_top in SDC, with commands that most tools know. Times in ns. Why each is needed:
-# crossings.md. Set clk_period to 1e6 / G_CLK_KHZ before reading this file, else it is 10 ns.
+# ../crossings.md. Set clk_period to 1e6 / G_CLK_KHZ before reading this file, else it is 10 ns.
 if {![info exists clk_period]} {
   set clk_period 10.0
 }
