@@ -12,6 +12,9 @@ export JOBS VERBOSE T SEED SEEDS SETUP STAGE CFG PLANE CELL
 CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
                IMG_COLS IMG_ROWS LANES RECTIFIED DISPARITY WAVES
 
+# What the vendor flows take.
+FLOW_OPTIONS = $(if $(BOARD),--board $(BOARD)) $(if $(TOP),--top $(TOP)) $(if $(CFG),--config $(CFG)) $(GENERICS)
+
 .PHONY: help
 help: ## This list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -94,6 +97,14 @@ cost-update: setup ## All counts again into scripts/cost/baseline.json, docs/cos
 pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (half an hour)   CFG=tile SEEDS=1,2,3
 	@scripts/setup.sh build cost
 	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS))
+
+.PHONY: ise
+ise: ## Vendor flow, Virtex-5QV and Virtex-6 with ISE 14.7   BOARD=virtex5qv TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
+	@scripts/ise/ise.py $(FLOW_OPTIONS)
+
+.PHONY: nxmap
+nxmap: ## Vendor flow, NG-MEDIUM with NanoXplore's nxpython   BOARD=ng_medium TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
+	@scripts/nxmap/nxmap.py $(FLOW_OPTIONS)
 
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
