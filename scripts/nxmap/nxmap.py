@@ -50,7 +50,8 @@ OPTIONS = {
 }
 # Where the tool must not choose by itself. The array of async_fifo is read without a clock, by another clock domain:
 # flip-flops. With ECC (docs/cost.md says what it takes) the RAMs behind ram_sdp, ram_2r and ram_dc would be 'RAM_ECC'.
-MAPPING = (("*async_fifo*", "RAM", "DFF"),)
+# Entity, kind, target; for those that the top contains.
+MAPPING = (("async_fifo", "RAM", "DFF"),)
 
 
 def load(path):
@@ -85,8 +86,9 @@ def build(nx, job, out, synthesise_only):
     project.addFiles("work", job["files"])
     project.addParameters({name: str(value) for name, value in job["generics"].items()})
     project.setOptions(OPTIONS)
-    for models, kind, target in MAPPING:
-        project.addMappingDirective(nx.getModels(models), kind, target)
+    for entity, kind, target in MAPPING:
+        if str(flow.RTL / (entity + ".vhd")) in job["files"]:
+            project.addMappingDirective(nx.getModels("*" + entity + "*"), kind, target)
     if job["banks"]:
         project.addBanks(job["banks"])
     if job["pads"]:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Stand-in for xst, ngdbuild, map, par, trce and bitgen of ISE 14.7: which one, its own name says (links to this file).
+"""Stand-in for xst, ngdbuild, map, par, trce and bitgen of ISE 14.7: ise_tools.py PROGRAM ARGUMENT .., called by small
+scripts of their names that scripts/check_flows.py writes.
 
 Logs its arguments as a line of JSON to $ISE_LOG, refuses what the real ones would refuse as far as known (unknown
 option, unknown value, missing file, unknown top or generic), writes the files that the next one reads, and copies a
@@ -114,10 +115,10 @@ def synthesise(found):
 
 
 def main():
-    program = pathlib.Path(sys.argv[0]).name
+    program, arguments = pathlib.Path(sys.argv[1]).name, sys.argv[2:]
     with open(os.environ["ISE_LOG"], "a") as log:
-        log.write(json.dumps([program] + sys.argv[1:]) + "\n")
-    found, files = read_arguments(program, sys.argv[1:])
+        log.write(json.dumps([program] + arguments) + "\n")
+    found, files = read_arguments(program, arguments)
     if program in os.environ.get("ISE_FAIL", "").split():
         refuse(program, "told to fail")
     reports = pathlib.Path(os.environ["ISE_REPORTS"])

@@ -22,11 +22,14 @@ proc get_ports {patterns} {
   }
   return $found
 }
+# Marked, because a port may have the same name.
 proc get_clocks {names} {
+  set found {}
   foreach name $names {
     if {$name ni $::clocks} { error "no clock $name" }
+    lappend found "clock:$name"
   }
-  return $names
+  return $found
 }
 # Options with a value, options without one, number of other arguments.
 proc statement {name with without number arguments} {
@@ -46,6 +49,7 @@ proc statement {name with without number arguments} {
       lappend rest $word
     }
   }
+  if {[dict exists $options -clock]} { get_clocks [dict get $options -clock] }
   if {[llength $rest] != $number} { error "$name: [llength $rest] arguments instead of $number" }
   puts [join [concat [list $name] $options [list {}] $rest] "\t"]
   return $options
