@@ -106,6 +106,13 @@ ise: ## Vendor flow, Virtex-5QV and Virtex-6 with ISE 14.7   BOARD=virtex5qv TOP
 nxmap: ## Vendor flow, NG-MEDIUM with NanoXplore's nxpython   BOARD=ng_medium TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
 	@scripts/nxmap/nxmap.py $(FLOW_OPTIONS)
 
+.PHONY: check-flows
+check-flows: ## Vendor flows, constraints, FuseSoC cores checked without the vendors' tools; faults told   FUSESOC=1
+	@scripts/setup.sh build flows
+	@scripts/check_flows.py
+	@scripts/check_flows.py --faults
+	@$(if $(FUSESOC),scripts/check_flows.py --fusesoc,true)
+
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
 	@scripts/build.sh psweep

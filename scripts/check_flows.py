@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of the vendor flows, constraints and FuseSoC cores that need none of the vendors' tools.
 
-  scripts/check_flows.py [CHECK ..]     default: all of these
+  scripts/check_flows.py [CHECK ..]     default: all of these, some 10 s
     sources      the same files in the same order in rtl/files.f, ISE, nxpython, FuseSoC, CMake
     analyse      GHDL takes each flow's list in its order as VHDL-93; every configuration elaborates in the wrapper
     generics     what the flows pass on exists; FuseSoC's parameters and defaults are those of the VHDL
@@ -12,7 +12,7 @@
     ise          the flow against stand-ins of xst .. bitgen; failing programs, missed timing, no programs
     reports      the readers of reports on short ones, whole and damaged
     scripts      syntax for the tools' Pythons (3.6); --help
-  scripts/check_flows.py --faults       a fault each into a copy of the tree: does its check tell?
+  scripts/check_flows.py --faults       a fault each into a copy of the tree: does its check tell? (20 s)
   scripts/check_flows.py --fusesoc      FuseSoC itself (from the Python Package Index, into build/flows/venv): cores are
                                         found, analysed and elaborated by GHDL, a wrong parameter is refused
 
@@ -93,10 +93,11 @@ def configurations():
 
 
 def prepared(work, top, board, config="tile"):
-    """Folder of what ise.py writes."""
+    """Folder of what ise.py writes (in this process: for many configurations; check_ise runs it as users do)."""
     out = work / "ise-{}-{}-{}".format(board, top, config)
-    call([sys.executable, HERE / "ise" / "ise.py", "--top", top, "--board", board, "--config", config, "--prepare",
-          "--out", out])
+    settings = project.board(board, "ise")
+    generics = project.generics(top, config, settings)
+    load("ise", HERE / "ise" / "ise.py").prepare(top, board, settings, generics, project.clk_ns(top, generics), out)
     return out
 
 
@@ -766,7 +767,7 @@ FAULTS = (
     ("ise", "scripts/ise/ise.py", '("fsm_encoding", "Auto")', '("fsm_encodings", "Auto")', "option: -fsm_encodings"),
     ("ise", "scripts/ise/ise.py", '"-w", "-detail", "-ol"', '"-w", "-details", "-ol"', "unknown option -details"),
     ("ise", "scripts/ise/ise.py", '"-top {}".format(entity)', '"-top {}".format(name + "_pin")', "no entity"),
-    ("ise", "scripts/ise/ise.py", "    if code:\n", "    if code > 99:\n", "exit code"),
+    ("ise", "scripts/ise/ise.py", "    if code:\n", "    if code > 99:\n", "does not say 'see"),
     ("ise", "constraints/virtex5qv/board.json", "xqr5vfx130-1-cf1752", "xqr5vfx130", "part xqr5vfx130"),
     ("reports", "scripts/ise/reports.py", "r\"\\d+/(\\d+)\\Z\"", "r\"(\\d+)/\\d+\\Z\"", "instead of"),
     ("reports", "scripts/ise/reports.py", "counts[\"ram36\"] + counts[\"ram18\"] / 2", "counts[\"ram36\"]", "Virtex-6"),
