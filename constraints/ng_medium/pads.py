@@ -4,6 +4,7 @@
 To make a board of it: copy this folder, set "pads": "known" in board.json, list the banks in BANKS with their voltage,
 and give every pad a 'location' ('IOB12_D09P': bank, pair, side), clocks on pads that reach a clock generator. The
 oscillator of the development kit (25 MHz) is too slow for clk, which needs 30 MHz: a PLL would have to come between.
+The 50 MHz in board.json are what is asked for: nobody knows yet what the device reaches.
 Without locations the tool places the pads as it likes: good for resources and clock, not for a board.
 Names: ports of the VHDL, bits in brackets. 'registered': the flip-flop next to the pad goes into it.
 """

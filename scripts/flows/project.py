@@ -26,6 +26,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "scripts" / "cost"))
 
 import measure  # noqa: E402  (generics and configurations are read in one place)
+import points  # noqa: E402
 
 CostError = measure.CostError
 RTL = ROOT / "rtl"
@@ -123,10 +124,28 @@ def pin_bits(top, settings):
     return out
 
 
+def configured(top, config):
+    """Generics of a configuration by name, or of a row of docs/cost.md (scripts/cost/points.py) for this top."""
+    try:
+        return measure.config_generics(top, config, RTL)
+    except CostError:
+        point = points.POINTS.get(config, {})
+        if point.get("entity", "psweep") != top or not point or "unit" in point:
+            raise
+    out = measure.config_generics(top, point["config"], RTL) if "config" in point else {}
+    out.update(point.get("generics", {}))
+    return out
+
+
+def config_of(settings, top):
+    """What is built where no configuration is given: what is meant for this device."""
+    return settings["config"] if TOPS[top]["pads"] else "tile"
+
+
 def generics(top, config, settings, given=()):
     """{'G_X': n}: by the configuration, then by the board, then as given ('G_X=n'). Unknown names are errors."""
     known = measure.generics_of(top, RTL)
-    out = dict(measure.config_generics(top, config, RTL))
+    out = configured(top, config)
     for name, value in settings.get("generics", {}).items():
         if name in known:
             out[name] = value
@@ -141,16 +160,17 @@ def generics(top, config, settings, given=()):
     return out
 
 
-def clk_ns(top, chosen, mhz=None):
-    """Period of clk: by G_CLK_KHZ where the entity has it, for it must be right; else by mhz, or the chip's default."""
-    known = measure.generics_of(top, RTL)
-    if "G_CLK_KHZ" in known:
+def clk_ns(top, chosen, settings, mhz=None):
+    """Period of clk: by G_CLK_KHZ where the entity has it, for it must be right; else by mhz, or the board's, or the
+    chip's default."""
+    if "G_CLK_KHZ" in measure.generics_of(top, RTL):
         if mhz is not None:
             raise FlowError("{} knows its clock: give G_CLK_KHZ instead".format(top))
-        return round(1e6 / chosen.get("G_CLK_KHZ", int(known["G_CLK_KHZ"])), 3)
-    if mhz is not None:
+    elif mhz is not None:
         return round(1e3 / mhz, 3)
-    return round(1e6 / int(measure.generics_of("psweep_top", RTL)["G_CLK_KHZ"]), 3)
+    else:
+        chosen = settings["generics"]
+    return round(1e6 / chosen.get("G_CLK_KHZ", int(measure.generics_of("psweep_top", RTL)["G_CLK_KHZ"])), 3)
 
 
 def wrapper(top, settings):

@@ -5,9 +5,10 @@
   scripts/ise/ise.py [--board B] [--top T] [--config NAME] [--out FOLDER] [option ..] [G_X=n ..]
     --board B       folder of constraints/ whose board.json has "tool": "ise" (default virtex5qv)
     --top T         psweep_top (default): with pins; psweep, arbiter: alone, for resources and clock
-    --config NAME   as for 'make cost': tb/chip/configs/NAME.json for psweep_top, else tb/configs or build/configs
-                    (default tile); G_X=n overrides a generic
-    --mhz F         clock of psweep (psweep_top and arbiter: 1000 * G_CLK_KHZ; default as that of psweep_top)
+    --config NAME   as for 'make cost': tb/chip/configs/NAME.json for psweep_top, else tb/configs or build/configs, or
+                    a row of docs/cost.md (scripts/cost/points.py); default: that of board.json for psweep_top, else
+                    tile. G_X=n overrides a generic
+    --mhz F         clock of psweep; psweep_top and arbiter: G_CLK_KHZ. Default: by board.json or the configuration
     --prepare       write all files, run nothing
     --synthesise    stop after xst: estimates before map
     --report        read the reports that are there, run nothing
@@ -148,7 +149,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--board", default="virtex5qv")
     parser.add_argument("--top", default="psweep_top", choices=sorted(project.TOPS))
-    parser.add_argument("--config", default="tile")
+    parser.add_argument("--config")
     parser.add_argument("--mhz", type=float)
     parser.add_argument("--out")
     how = parser.add_mutually_exclusive_group()
@@ -159,8 +160,9 @@ def main():
     options = parser.parse_args()
     top = options.top
     settings = project.board(options.board, "ise")
+    options.config = options.config or project.config_of(settings, top)
     generics = project.generics(top, options.config, settings, options.generics)
-    period = project.clk_ns(top, generics, options.mhz)
+    period = project.clk_ns(top, generics, settings, options.mhz)
     out = pathlib.Path(options.out or project.ROOT / "build" / "ise" / "-".join(
         [options.board, top, options.config])).resolve()
     question = {"entity": top, "family": settings["family"], "generics": generics, "tool": RELEASE,

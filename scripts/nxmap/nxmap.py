@@ -5,9 +5,10 @@
   scripts/nxmap/nxmap.py [--board B] [--top T] [--config NAME] [--out FOLDER] [option ..] [G_X=n ..]
     --board B       folder of constraints/ whose board.json has "tool": "nxmap" (default ng_medium)
     --top T         psweep_top (default): with pins; psweep, arbiter: alone, for resources and clock
-    --config NAME   as for 'make cost': tb/chip/configs/NAME.json for psweep_top, else tb/configs or build/configs
-                    (default tile); G_X=n overrides a generic
-    --mhz F         clock of psweep (psweep_top and arbiter: 1000 * G_CLK_KHZ; default as that of psweep_top)
+    --config NAME   as for 'make cost': tb/chip/configs/NAME.json for psweep_top, else tb/configs or build/configs, or
+                    a row of docs/cost.md (scripts/cost/points.py); default: that of board.json for psweep_top, else
+                    tile. G_X=n overrides a generic
+    --mhz F         clock of psweep; psweep_top and arbiter: G_CLK_KHZ. Default: by board.json or the configuration
     --prepare       write the wrapper and the list of what is given to the tool, run nothing
     --synthesise    stop after synthesis
     --report        read the reports that are there, run nothing
@@ -145,7 +146,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--board", default="ng_medium")
     parser.add_argument("--top", default="psweep_top", choices=sorted(flow.TOPS))
-    parser.add_argument("--config", default="tile")
+    parser.add_argument("--config")
     parser.add_argument("--mhz", type=float)
     parser.add_argument("--out")
     how = parser.add_mutually_exclusive_group()
@@ -156,6 +157,7 @@ def main():
     options = parser.parse_args()
     top = options.top
     settings = flow.board(options.board, "nxmap")
+    options.config = options.config or flow.config_of(settings, top)
     generics = flow.generics(top, options.config, settings, options.generics)
     out = pathlib.Path(options.out or flow.ROOT / "build" / "nxmap" / "-".join(
         [options.board, top, options.config])).resolve()
@@ -164,7 +166,7 @@ def main():
     wrapper.write_text(flow.wrapper(top, settings))
     banks, pads = pads_of(top, options.board, settings)
     job = {"top": top, "board": options.board, "part": settings["part"], "generics": generics, "banks": banks,
-           "pads": pads, "clk_ns": flow.clk_ns(top, generics, options.mhz),
+           "pads": pads, "clk_ns": flow.clk_ns(top, generics, settings, options.mhz),
            "files": [str(f) for f in flow.sources(top)] + [str(wrapper)]}
     question = {"entity": top, "family": settings["family"], "generics": generics, "tool": TOOL,
                 "part": settings["part"], "config": options.config, "board": options.board}
