@@ -72,7 +72,7 @@ sweep: setup ## Engines of random sizes and formats, each built and tried (5 min
 
 .PHONY: sim-gates
 sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recorded streams; broken cells are noticed
-	@scripts/setup.sh gates
+	@scripts/setup.sh gates cost
 	@scripts/build.sh record_engine
 	@scripts/sim_gates.sh
 

@@ -4,7 +4,10 @@
 # and every output port has to be as recorded before every clock (docs/gates.md). Then one cell of each kind is broken
 # in turn, and the simulation has to see it.
 #
-#   scripts/sim_gates.sh [--build DIR] [--out DIR] [--no-faults] [CONFIGURATION ...]    default: tiny odd_2
+#   scripts/sim_gates.sh [--build DIR] [--out DIR] [--no-faults] [CONFIGURATION[:counted] ...]
+#                    default: tiny odd_2 tiny:counted odd_2:counted
+#     :counted     the netlist whose cells 'make cost' counts: by the Yosys of scripts/cost/requirements.txt, debug
+#                  ports left open; else by the installed Yosys, with the debug ports compared too
 #     --build      folder with tb/replay/record_engine and tb/rtl/psweep_*/psweep.v (default: build)
 #     --out        where to write (default: build/sim-gates)
 #     --no-faults  without the broken cells (they are tried on the first configuration)
@@ -25,7 +28,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ ${#names[@]} -gt 0 ] || names=(tiny odd_2)
+[ ${#names[@]} -gt 0 ] || names=(tiny odd_2 tiny:counted odd_2:counted)
 out=${out:-$build/sim-gates}
 for program in yosys iverilog vvp perl; do
   command -v $program > /dev/null ||
@@ -35,6 +38,14 @@ done
 # Debian's yosys comes without yosys-config; the cell models lie beside the program.
 cells=$(dirname "$(dirname "$(readlink -f "$(command -v yosys)")")")/share/yosys/xilinx/cells_sim.v
 [ -f "$cells" ] || { echo "sim_gates.sh: Yosys' cell models are not at $cells" >&2; exit 2; }
+counted_cells=''
+case " ${names[*]} " in
+  *:counted\ *)
+    scripts/cost/venv.sh --check || exit 2
+    counted_cells=$(echo "${COST_VENV:-build/cost/venv}"/lib/python3*/site-packages/pyosys/share/xilinx/cells_sim.v)
+    [ -f "$counted_cells" ] || { echo "sim_gates.sh: Yosys' cell models are not at $counted_cells" >&2; exit 2; }
+    ;;
+esac
 
 compile() { # compile PROGRAM NETLIST DIR: true if Icarus takes it without a word
   local log
@@ -51,7 +62,7 @@ replay() { # replay PROGRAM RECORDING [+first]: prints what the bench says; true
 } 3>&1
 
 gates() { # one configuration
-  local name=$1 dir=$out/$1 begun=$SECONDS
+  local name=${1%:counted} dir=$out/${1/:/_} begun=$SECONDS models=$cells open=()
   local verilog=$build/tb/rtl/psweep_$name/psweep.v
   [ -f "$verilog" ] || { echo "there is no $verilog"; return 1; }
   rm -rf "$dir"
@@ -60,10 +71,30 @@ gates() { # one configuration
     > "$dir/record.log" || { cat "$dir/record.log"; return 1; }
   grep clocks "$dir/record.log"
   echo "Yosys at work"
+  if [ "$1" != "$name" ]; then
+    models=$counted_cells open=(-dbg_)
+    scripts/cost/measure.py --config "$name" --netlist "$dir/raw.v" || return 1
+  else
+    synthesise || return 1
+  fi
+  echo "netlist after $((SECONDS - begun)) s:"
+  perl -ne '$n{$1}++ if /^  ([A-Z][A-Z0-9]+) (?:#\(|\S+ \($)/;
+    END { printf "  %-9s %d\n", $_, $n{$_} for sort keys %n }' "$dir/raw.v"
+  # Unknown start values are what the models of block_rams.v start with; others they do not have.
+  perl -0pe 's/^\s*\.INITP?_[0-9A-F]{2}\(\d+.[hb]x+\),?\n//mg' "$dir/raw.v" > "$dir/netlist.v"
+  # A register of the DSP that is left out is a copy of its input; Icarus would see no change of a constant input.
+  perl -0pe 's/^module RAMB(?:18|36)E1\b.*?^endmodule\n//msg;
+    s/always \@\* (\w+)\s*<?= (\w+);/always begin $1 = $2; \@($2); end/g' "$models" > "$dir/cells.v"
+  perl tb/replay/ports.pl gates "$verilog" psweep rtl/psweep.vhd tb/gates/replay.v.in clk "${open[@]}" > "$dir/bench.v"
+  compile "$dir/gates.vvp" "$dir/netlist.v" "$dir" || return 1
+  replay "$dir/gates.vvp" "$dir/recording.txt" || { echo "FAILED: the netlist differs"; return 1; }
+  echo "the netlist is bit-exact ($((SECONDS - begun)) s)"
+}
+
+synthesise() { # with the installed Yosys; name, dir, verilog of gates()
   {
     echo "read_verilog $verilog"
     echo "synth_xilinx -family xc6v -flatten -noiopad -top psweep"
-    echo "tee -o $dir/stat.txt stat"
     echo "write_verilog -noattr $dir/raw.v"
   } > "$dir/synth.ys"
   if [ -n "${VERBOSE:-}" ]; then
@@ -72,21 +103,12 @@ gates() { # one configuration
     yosys -q -l "$dir/yosys.log" "$dir/synth.ys" > "$dir/messages.log" 2>&1 ||
       { tail -n 5 "$dir/messages.log"; return 1; }
   fi
-  echo "netlist after $((SECONDS - begun)) s:"
-  sed -nE 's/^ +(([A-Z][A-Z0-9]+) +[0-9]+|([0-9]+) +([A-Z][A-Z0-9]+))$/  \1/p' "$dir/stat.txt"
-  # Unknown start values are what the models of block_rams.v start with; others they do not have.
-  perl -0pe 's/^\s*\.INITP?_[0-9A-F]{2}\(\d+.[hb]x+\),?\n//mg' "$dir/raw.v" > "$dir/netlist.v"
-  perl -0pe 's/^module RAMB(?:18|36)E1\b.*?^endmodule\n//msg' "$cells" > "$dir/cells.v"
-  perl tb/replay/ports.pl gates "$verilog" psweep rtl/psweep.vhd tb/gates/replay.v.in clk > "$dir/bench.v"
-  compile "$dir/gates.vvp" "$dir/netlist.v" "$dir" || return 1
-  replay "$dir/gates.vvp" "$dir/recording.txt" || { echo "FAILED: the netlist differs"; return 1; }
-  echo "the netlist is bit-exact ($((SECONDS - begun)) s)"
 }
 
 # fault KIND SUBSTITUTION: breaks one cell of a kind, the middle one; if nobody ever sees what that one does, up to four
 # others in turn.
 fault() {
-  local kind=$1 dir=$out/${names[0]} number
+  local kind=$1 dir=$out/${names[0]/:/_} number
   for number in 5 3 7 2 8; do
     KIND=$kind NUMBER=$number perl -0pe '
       my $kind = $ENV{KIND};

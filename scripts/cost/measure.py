@@ -13,6 +13,7 @@
     --json FILE       everything as JSON ('-': standard output); docs/cost.md says what the fields mean
     --rtl FOLDER      another folder instead of rtl/ (with its files.f)
     --no-cache        measure anew
+    --netlist FILE    writes the netlist as Verilog instead (whole, flattened), for a simulation of what is counted
 
 VHDL is converted by GHDL, synthesised by the Yosys of the virtual environment (scripts/setup.sh cost). Debug outputs
 dbg_* are left open. Results are kept in build/cost/cache, by the converted Verilog, tool, family and these scripts: the
@@ -242,17 +243,36 @@ def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=No
             "hierarchy": hierarchy, "no_dsp": no_dsp, "tool": tool_version(), "cached": not fresh, **result}
 
 
+def netlist(entity, family, generics, rtl, path):
+    """Writes the circuit whose cells are counted as Verilog, for a simulation (scripts/sim_gates.sh)."""
+    rtl = pathlib.Path(rtl or ROOT / "rtl").resolve()
+    with tempfile.TemporaryDirectory(prefix="psweep-cost-") as folder:
+        work = pathlib.Path(folder)
+        (work / "top.v").write_text(convert(entity, generics, rtl, work)[0])
+        run_yosys(counted(entity, family, False, work) + [f"write_verilog -noattr {work}/netlist.v"], work)
+        pathlib.Path(path).write_text((work / "netlist.v").read_text())
+
+
+def source(top, work):
+    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
+
+
+def counted(top, family, no_dsp, work, rows=()):
+    """Yosys commands to the netlist whose cells are counted; rows: modules that stay as they are."""
+    return (source(top, work) + [f"setattr -mod -set keep_hierarchy 1 {m}" for m in rows]
+            + families.commands(family, top, no_dsp, work))
+
+
 def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     started = time.time()
     entities = [f[:-4] for f in all_entities(rtl)]
     modules = re.findall(r"^module (\S+)", (work / "top.v").read_text(), re.M)
     rows = [m for m in modules if netlists.entity_of(m, entities) in units and strip_top(m) != top] \
         if hierarchy else []
-    read = [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
-    commands = read + [f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap", "wreduce t:$mul",
-                       "opt_clean", f"write_json {work}/memories.json", "new design"]
-    commands += read + [f"setattr -mod -set keep_hierarchy 1 {m}" for m in rows]
-    commands += families.commands(family, top, no_dsp, work) + [f"write_json {work}/netlist.json"]
+    commands = source(top, work) + [
+        f"hierarchy -check -top {top}", "proc", "opt_clean", "memory -nomap", "wreduce t:$mul", "opt_clean",
+        f"write_json {work}/memories.json", "new design"]
+    commands += counted(top, family, no_dsp, work, rows) + [f"write_json {work}/netlist.json"]
     run_yosys(commands, work)
     found = json.loads((work / "netlist.json").read_text())
     memories, products = netlists.memories(json.loads((work / "memories.json").read_text()), top, units)
@@ -298,7 +318,8 @@ def plain(cells):
 
 
 # Its text when this started: a file that changes meanwhile must not name results of the old one.
-SYNTHESISE = ast.dump(ast.parse(inspect.getsource(synthesise))).encode()
+SYNTHESISE = "".join(
+    ast.dump(ast.parse(inspect.getsource(part))) for part in (source, counted, synthesise)).encode()
 
 
 def strip_top(module):
@@ -323,6 +344,7 @@ def main():
     parser.add_argument("--hierarchy", action="store_true")
     parser.add_argument("--no-dsp", action="store_true")
     parser.add_argument("--json")
+    parser.add_argument("--netlist")
     parser.add_argument("--rtl")
     parser.add_argument("--no-cache", action="store_true")
     parser.add_argument("generics", nargs="*", metavar="G_X=n")
@@ -335,6 +357,9 @@ def main():
             if not re.fullmatch(r"G_\w+=-?\d+", pair):
                 raise CostError(f"'{pair}' is not G_X=n")
             given[pair.split("=")[0]] = int(pair.split("=")[1])
+        if options.netlist:
+            netlist(options.entity, options.family, given, options.rtl, options.netlist)
+            return
         result = measure(options.entity, options.family, given, options.hierarchy, options.no_dsp, options.rtl,
                          not options.no_cache, unit=options.unit)
     except CostError as error:

@@ -722,7 +722,8 @@ TEST_CASE("a chip that cannot serve the request, or none at all", "[cli][net]") 
     const Outcome o = psweep_run(dir, command + silent);
     INFO(o.err);
     CHECK(o.code == 1);
-    CHECK_THAT(o.err, contains(silent + ": no valid answer for 0."));
+    // How long is not compared: a busy machine may come back late.
+    CHECK_THAT(o.err, contains(silent + ": no valid answer for "));
     CHECK_FALSE(fs::exists(dir / "out"));
   }
   CHECK(psweep_run(dir, "info http://127.0.0.1").code == 2);
