@@ -99,7 +99,7 @@ pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine 
 	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS))
 
 .PHONY: ise
-ise: ## Vendor flow, Virtex-5QV and Virtex-6 with ISE 14.7   BOARD=virtex5qv TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
+ise: ## Vendor flow, Virtex-5QV and Virtex-6: ISE 14.7   BOARD=virtex5qv TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
 	@scripts/ise/ise.py $(FLOW_OPTIONS)
 
 .PHONY: nxmap

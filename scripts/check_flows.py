@@ -344,8 +344,9 @@ def check_sdc(work):
 
 STANDARDS = {"xc5v": {"LVCMOS12", "LVCMOS15", "LVCMOS18", "LVCMOS25", "LVCMOS33", "LVTTL"},
              "xc6v": {"LVCMOS12", "LVCMOS15", "LVCMOS18", "LVCMOS25"}}
-# Ball of a BGA: letters of the row without I, O, Q, S, X, Z; number of the column.
-BALL = r"[ABCDEFGHJKLMNPRTUVWY]{1,2}[1-9]\d?\Z"
+# Balls of a package: so many rows (letters without I, O, Q, S, X, Z: A .. Y, AA .. AY, BA ..), as many columns.
+PACKAGES = {"ff1156": 34, "cf1752": 42}
+LETTERS = "ABCDEFGHJKLMNPRTUVWY"
 ITEM = {
     "LOC": r'LOC = "(\w+)"', "IOSTANDARD": r"IOSTANDARD = (\w+)", "SLEW": r"SLEW = (FAST|SLOW)",
     "DRIVE": r"DRIVE = (2|4|6|8|12|16|24)", "TIG": r"(TIG)", "TNM_NET": r'TNM_NET = "(\w+)"',
@@ -353,6 +354,14 @@ ITEM = {
     "IN": r'OFFSET = (IN [\d.]+ ns VALID [\d.]+ ns BEFORE "\w+" RISING)',
     "OUT": r'OFFSET = (OUT [\d.]+ ns AFTER "\w+" RISING)',
 }
+
+
+def is_ball(location, part):
+    number = PACKAGES.get(part.split("-")[-1])
+    need(number, "no package {} in PACKAGES of scripts/check_flows.py".format(part.split("-")[-1]))
+    rows = [first + letter for first in ("", "A", "B") for letter in LETTERS][:number]
+    match = re.match(r"([A-Z]+)([1-9]\d?)\Z", location)
+    return bool(match) and match[1] in rows and int(match[2]) <= number
 
 
 def read_ucf(text, bits, where):
@@ -441,7 +450,8 @@ def check_ucf(work):
                 need(items.get("IOSTANDARD") in STANDARDS[settings["family"]], "{}: {}: IOSTANDARD {}".format(
                     where, bit, items.get("IOSTANDARD")))
                 if settings["pads"] == "known":
-                    need(re.match(BALL, items.get("LOC", "")), "{}: {}: LOC {}".format(where, bit, items.get("LOC")))
+                    need(is_ball(items.get("LOC", ""), settings["part"]), "{}: {}: LOC {}".format(
+                        where, bit, items.get("LOC")))
                     need(items["LOC"] not in balls, "{}: {} and {} on {}".format(
                         where, bit, balls.get(items["LOC"]), items["LOC"]))
                     balls[items["LOC"]] = bit
@@ -753,6 +763,7 @@ FAULTS = (
     ("ucf", "constraints/ml605/pins.ucf", 'NET "mii_crs"    LOC', 'NET "mii_csr"    LOC', "no port mii_csr"),
     ("ucf", "constraints/ml605/pins.ucf", 'LOC = "AF14"', 'LOC = "AN13"', "mii_rxd<1> and mii_rxd<0> on AN13"),
     ("ucf", "constraints/ml605/pins.ucf", 'LOC = "AF14"', 'LOC = "AI14"', "LOC AI14"),
+    ("ucf", "constraints/ml605/pins.ucf", 'LOC = "AF14"', 'LOC = "AV14"', "LOC AV14"),
     ("ucf", "constraints/ml605/pins.ucf", 'NET "mii_col"    TIG;\n', "", "port mii_col has 0 constraints"),
     ("ucf", "constraints/ml605/pins.ucf", "IOSTANDARD = LVCMOS25;", "IOSTANDARD = LVCMOS33;", "IOSTANDARD LVCMOS33"),
     ("ucf", "constraints/virtex5qv/pins.ucf", "SLEW = FAST", "SLEW = QUICK", "not understood: SLEW = QUICK"),
