@@ -99,11 +99,11 @@ pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine 
 	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS))
 
 .PHONY: ise
-ise: ## Vendor flow, Virtex-5QV and Virtex-6: ISE 14.7   BOARD=virtex5qv TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
+ise: ## Vendor flow, Virtex-5QV and -6: ISE 14.7   BOARD=ml605 TOP=psweep CFG=tile GENERICS='G_X=n ..'
 	@scripts/ise/ise.py $(FLOW_OPTIONS)
 
 .PHONY: nxmap
-nxmap: ## Vendor flow, NG-MEDIUM with NanoXplore's nxpython   BOARD=ng_medium TOP=psweep_top CFG=tile GENERICS='G_X=n ..'
+nxmap: ## Vendor flow, NG-MEDIUM: NanoXplore's nxpython   TOP=psweep CFG=tile GENERICS='G_X=n ..'
 	@scripts/nxmap/nxmap.py $(FLOW_OPTIONS)
 
 .PHONY: check-flows

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Reads an SDC file as a timing tool would, with the commands that scripts/check_flows.py knows:
-# tclsh sdc.tcl FILE PORTS [clk_period]. PORTS: a file with a bit a line ('mii_rxd[0]'). Prints a line for each statement, fields separated by
-# tabs. Unknown command, option, port or clock, wrong number of arguments: an error.
+#   tclsh sdc.tcl FILE PORTS [clk_period]     PORTS: a file with a bit a line ('mii_rxd[0]')
+# Prints a line for each statement, fields separated by tabs. Unknown command, option, port or clock, wrong number of
+# arguments: an error.
 set clocks {}
 set handle [open [lindex $argv 1]]
 set ports [split [string trim [read $handle]] "\n"]
