@@ -152,7 +152,7 @@ def check_sources(work):
         compared += len(files)
     engine, chip = core("psweep"), core("psweep_top")
     need([str(ROOT / "rtl" / f) for f in engine[0] + chip[0]] == listed,
-         "FuseSoC: files differ from rtl/files.f: {}".format(
+         "FuseSoC: files differ from rtl/files.f: {} (run scripts/flows/cores.py)".format(
              sorted(set(engine[0] + chip[0]) ^ {pathlib.Path(f).name for f in listed}) or "order"))
     need(engine[0][-1] == "psweep.vhd", "FuseSoC: the engine ends with {}".format(engine[0][-1]))
     name = re.search(r"^name: (\S+)$", (ROOT / "rtl" / "psweep.core").read_text(), re.M)[1]
@@ -207,7 +207,7 @@ def check_generics(work):
         known = project.measure.generics_of(name, project.RTL)
         _, default, listed, _, toplevels = core(name)
         need(set(toplevels) == {name} and toplevels, "{}.core: top {}".format(name, toplevels))
-        need(default == known, "{}.core: parameters differ from the VHDL: {}".format(
+        need(default == known, "{}.core: parameters differ from the VHDL (run scripts/flows/cores.py): {}".format(
             name, sorted(set(default.items()) ^ set(known.items()))))
         need(sorted(listed) == sorted(known), "{}.core: parameters of the targets differ from the VHDL: {}".format(
             name, sorted(set(listed) ^ set(known))))
@@ -228,6 +228,18 @@ def check_generics(work):
         for script in (HERE / "ise" / "ise.py", HERE / "nxmap" / "nxmap.py"):
             call([sys.executable, script, "--prepare", "--out", work / "none"] + arguments, code=1, says=says)
             number += 1
+    # The cores are written again from files.f and the VHDL, byte by byte, after being spoilt.
+    tree = copy_tree(work / "cores")
+    for name in ("psweep", "psweep_top"):
+        spoilt = tree / "rtl" / (name + ".core")
+        change(spoilt, "      - " + core(name)[0][1] + "\n", "")
+        change(spoilt, "G_WINDOW: {datatype: int, paramtype: generic, default: 13}",
+               "G_WINDOW: {datatype: int, paramtype: generic, default: 9}")
+        change(spoilt, "      - G_PLANES\n", "")
+    call([sys.executable, tree / "scripts" / "flows" / "cores.py"], says="psweep_top.core written")
+    for name in ("psweep", "psweep_top"):
+        need((tree / "rtl" / (name + ".core")).read_text() == (ROOT / "rtl" / (name + ".core")).read_text(),
+             "scripts/flows/cores.py: {}.core is not as before".format(name))
     return number, "generics"
 
 
