@@ -107,11 +107,12 @@ nxmap: ## Vendor flow, NG-MEDIUM: NanoXplore's nxpython   TOP=psweep CFG=tile GE
 	@scripts/nxmap/nxmap.py $(FLOW_OPTIONS)
 
 .PHONY: check-flows
-check-flows: ## Vendor flows, constraints, FuseSoC cores checked without the vendors' tools; faults told   FUSESOC=1
+check-flows: ## Vendor flows, constraints, FuseSoC cores checked without the vendors' tools   FUSESOC=1 STA=1
 	@scripts/setup.sh build flows
 	@scripts/check_flows.py
 	@scripts/check_flows.py --faults
 	@$(if $(FUSESOC),scripts/check_flows.py --fusesoc,true)
+	@$(if $(STA),scripts/setup.sh sta && scripts/flows/sta.py,true)
 
 .PHONY: real
 real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: build/real/
