@@ -4,13 +4,12 @@
 Methods, arguments, options and their values: NanoXplore's pages on nxpython and public scripts for NG-MEDIUM. Unknown
 method, wrong number or name of arguments, unknown option or value, missing source, a model, port or clock that is not
 there, a generic that the top has not: an exception. Calls go to $NX_LOG as lines of JSON; the step named in $NX_FAIL
-returns False; reports are copied from $NX_REPORTS, the timing report is $NX_TIMING.
+returns False; reports are copied from $NX_REPORTS, the timing report is $NX_TIMING, both with the names of the top.
 """
 import json
 import os
 import pathlib
 import re
-import shutil
 
 YES = {"Yes", "No"}
 EFFORT = {"Low", "Medium", "High"}
@@ -69,7 +68,11 @@ class Analyzer(object):
         need(set(settings) <= {"conditions", "maximumSlack", "searchPathsLimit"}, "launch: {}".format(settings))
         need(settings.get("conditions") in {"worstcase", "typical", "bestcase"}, "launch: {}".format(settings))
         record("launch", [settings])
-        shutil.copy(os.environ["NX_TIMING"], str(self.project.logs / "Timing_Constraints_Report_Routed.timing"))
+        text = pathlib.Path(os.environ["NX_TIMING"]).read_text()
+        for clock in ("rx_clk", "tx_clk"):
+            if clock in self.project.clocks:
+                text = text.replace("mii_" + clock, clock)
+        (self.project.logs / "Timing_Constraints_Report_Routed.timing").write_text(text)
 
 
 class Project(object):
@@ -214,7 +217,8 @@ class Project(object):
 
     def reportInstances(self):
         record("reportInstances", [])
-        shutil.copy(os.path.join(os.environ["NX_REPORTS"], "hierarchy.json"), str(self.logs))
+        text = pathlib.Path(os.environ["NX_REPORTS"], "hierarchy.json").read_text()
+        (self.logs / "hierarchy.json").write_text(text.replace("psweep_top", self.top[:-len("_pins")]))
 
     def createAnalyzer(self):
         record("createAnalyzer", [])
