@@ -664,25 +664,26 @@ def check_reports(work):
             return
         raise Wrong("{}: read without a word".format(what))
     counts, rows = ise.map_report(texts["virtex6_map.mrp"])
-    equal("Virtex-6", counts, {"lut": 4800, "ff": 3900, "srl": 230, "lutram": 20, "ram36": 120, "ram18": 27, "dsp": 15,
-                               "ram36_equivalent": 133.5})
+    equal("Virtex-6", counts, {"lut": 4800, "ff": 3900, "srl": 230, "lutram": 20, "lut_memory": 250, "ram36": 120,
+                               "ram18": 27, "dsp": 15, "ram36_equivalent": 133.5})
     units = project.units_of(rows, "psweep_top")
     equal("units", sorted(units), ["async_fifo", "control", "interpolation", "mac_rx", "responder", "similarity",
                                    "updating"])
     equal("interpolation", (units["interpolation"]["instances"], units["interpolation"]["dsp"]), (2, 6))
     equal("similarity", units["similarity"]["lut"], 800)
     counts, rows = ise.map_report(texts["virtex5_map.mrp"])
-    equal("Virtex-5", counts, {"lut": 3100, "ff": 3300, "srl": 194, "lutram": 6, "ram36": 71, "ram18": 20, "dsp": 15,
-                               "ram36_equivalent": 81.0})
+    equal("Virtex-5", counts, {"lut": 3100, "ff": 3300, "srl": 194, "lutram": 6, "lut_memory": 200, "ram36": 71,
+                               "ram18": 20, "dsp": 15, "ram36_equivalent": 81.0})
     equal("engine", rows[("u_psweep",)]["lut"], 3000)
     timing, met = ise.timing_report(texts["virtex6.twr"])
     equal("met", met, True)
-    equal("clocks", ise.clocks(timing)["mii_tx_clk"], {"asked_ns": 40.0, "reached_ns": 6.25, "fmax_mhz": 160.0})
+    equal("clocks", ise.clocks(timing, ("clk", "mii_rx_clk", "mii_tx_clk"))["mii_tx_clk"],
+          {"asked_ns": 40.0, "reached_ns": 6.25, "fmax_mhz": 160.0})
     equal("crossing", timing["TS_rx_to_clk"], {"errors": 0, "asked_ns": 15.152, "reached_ns": 3.2})
     equal("constraints", len(timing), 5)
     timing, met = ise.timing_report(texts["missed.twr"])
     equal("missed", (met, timing["TS_clk"]["errors"]), (False, 7))
-    equal("MHz", ise.clocks(ise.timing_report(texts["virtex5.twr"])[0])["clk"]["asked_ns"], 8.0)
+    equal("MHz", ise.clocks(ise.timing_report(texts["virtex5.twr"])[0], ("clk",))["clk"]["asked_ns"], 8.0)
     counts, mhz = ise.synthesis_report(texts["virtex6.syr"])
     equal("xst", (counts["lut"], counts["srl"], counts["lutram"], counts["ram36_equivalent"], counts["dsp"], mhz),
           (2100, 10, 20, 55, 0, 160.0))
@@ -713,8 +714,9 @@ def check_reports(work):
         refused(what, reader, texts[name].replace(old, new), *more)
         number += 1
     timing, _ = ise.timing_report(texts["virtex6.twr"].replace("Minimum period is", "Period is"))
-    refused("no period", ise.clocks, timing)
-    return number + 1, "reports"
+    refused("no period", ise.clocks, timing, ("clk",))
+    refused("another clock", ise.clocks, ise.timing_report(texts["virtex5.twr"])[0], ("clk", "mii_rx_clk"))
+    return number + 2, "reports"
 
 
 # --- scripts ---

@@ -309,7 +309,7 @@ def units_of(rows, top):
 
 
 COLUMNS = (("LUT", "lut"), ("FF", "ff"), ("RAMB36", "ram36_equivalent"), ("RAMB48", "ram48"), ("RAM", "ram_blocks"),
-           ("DSP", "dsp"), ("carry", "carry"), ("LUTRAM", "lutram"))
+           ("DSP", "dsp"), ("carry", "carry"), ("LUTmem", "lut_memory"))
 
 
 def write_result(folder, question, counts, units, more):

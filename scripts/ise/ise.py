@@ -135,9 +135,10 @@ def report(question, top, out, synthesised_only):
     if not project.TOPS[top]["pads"]:  # without the wrapper's registers; block RAM and DSP are all of the entity
         if whole is None:
             raise project.FlowError("{}: Section 13 has no u_{}".format(text("_map.mrp")[1], top))
-        counts.update({key: whole[key] for key in ("lut", "ff", "lutram")})
+        counts.update({key: whole[key] for key in ("lut", "ff")})
     timing, met = reports.timing_report(*text(".twr"))
-    more = {"stage": "par", "timing_met": met, "clocks": reports.clocks(timing, text(".twr")[1]), "constraints": timing}
+    clocks = reports.clocks(timing, project.TOPS[top]["clocks"], text(".twr")[1])
+    more = {"stage": "par", "timing_met": met, "clocks": clocks, "constraints": timing}
     print(project.write_result(out, question, counts, units, more))
     for name, row in sorted(timing.items()):
         if row["errors"]:

@@ -31,6 +31,7 @@ def slices(text, report):
     memory = number(text, "Number used as Memory", report, True) or 0
     counts["srl"] = shift or 0
     counts["lutram"] = memory - counts["srl"]
+    counts["lut_memory"] = memory
     return counts
 
 
@@ -63,7 +64,7 @@ def hierarchy(text, report):
         raise ReportError("{}: no Section 13: map needs -detail".format(report))
     cells = [[cell.strip() for cell in row.strip().strip("|").split("|")] for row in rows]
     head = cells[0]
-    wanted = {"lut": "LUTs", "ff": "Slice Reg", "lutram": "LUTRAM", "ram_blocks": "BRAM/FIFO",
+    wanted = {"lut": "LUTs", "ff": "Slice Reg", "lut_memory": "LUTRAM", "ram_blocks": "BRAM/FIFO",
               "dsp": next((title for title in head if title.startswith("DSP48")), "DSP48")}
     for title in list(wanted.values()) + ["Module"]:
         if title not in head:
@@ -112,17 +113,15 @@ def timing_report(text, report=".twr"):
     return found, met
 
 
-def clocks(constraints, report=".twr"):
-    """{'clk': {'asked_ns', 'reached_ns', 'fmax_mhz'}} of the PERIOD constraints TS_<clock>."""
+def clocks(constraints, names, report=".twr"):
+    """{'clk': {'asked_ns', 'reached_ns', 'fmax_mhz'}} of these clocks, by the PERIOD constraints TS_<clock>."""
     found = {}
-    for name, row in constraints.items():
-        if name.startswith("TS_") and "_to_" not in name:
-            if "reached_ns" not in row or "asked_ns" not in row:
-                raise ReportError("{}: {} without a minimum period".format(report, name))
-            found[name[3:]] = {"asked_ns": row["asked_ns"], "reached_ns": row["reached_ns"],
-                               "fmax_mhz": round(1e3 / row["reached_ns"], 1)}
-    if not found:
-        raise ReportError("{}: no period of a clock".format(report))
+    for name in names:
+        row = constraints.get("TS_" + name, {})
+        if "reached_ns" not in row or "asked_ns" not in row:
+            raise ReportError("{}: no minimum period by TS_{}".format(report, name))
+        found[name] = {"asked_ns": row["asked_ns"], "reached_ns": row["reached_ns"],
+                       "fmax_mhz": round(1e3 / row["reached_ns"], 1)}
     return found
 
 
