@@ -589,9 +589,21 @@ def check_nxpython(work):
     calls = run_nx(work, "bitstream", [], root=tree, says="psweep_top.nxb")
     need([c[0] for c in calls][-1] == "generateBitstream", "no bitstream of a board with pads")
     pads_fit(calls, {"pads": "known"}, "nxpython, a board with pads")
-    call([sys.executable, HERE / "nxmap" / "nxmap.py", "--out", work / "bare"], code=3,
-         says="This needs NanoXplore nxpython", env=environment())
-    return number + 3, "calls and cases"
+    # The reports alone, by a Python without the module.
+    call([sys.executable, HERE / "nxmap" / "nxmap.py", "--report", "--out", work / "psweep_top"], says="clock mii_tx_clk",
+         env=environment())
+    # The tool's own Python is found on PATH; one without the module is told as no tool at all.
+    script = HERE / "nxmap" / "nxmap.py"
+    for name, path, code, says in (("tool", BENCH, 0, "no bitstream"), ("broken", work, 3, "This needs NanoXplore")):
+        (work / name).mkdir()
+        (work / name / "nxpython3").write_text("#!/bin/sh\nPYTHONPATH={} exec {} \"$@\"\n".format(
+            path, sys.executable))
+        (work / name / "nxpython3").chmod(0o755)
+        call([sys.executable, script, "--out", work / (name + "-out")], code=code, says=says, env=environment(
+            FRONT=work / name, NX_LOG=work / "tool.log", NX_REPORTS=REPORTS, NX_TIMING=REPORTS / "ng_medium.timing"))
+    call([sys.executable, script, "--out", work / "bare"], code=3, says="This needs NanoXplore nxpython",
+         env=environment())
+    return number + 6, "calls and cases"
 
 
 # --- ise ---
@@ -625,7 +637,10 @@ def check_ise(work):
         got = (result["counts"]["lut"], result["counts"]["ram36_equivalent"], result["counts"]["dsp"],
                result["clocks"]["clk"]["fmax_mhz"])
         need(got == wanted, "{}: result.json has {} instead of {}".format(board, got, wanted))
-        for other in project.TOPS:
+        call([sys.executable, HERE / "ise" / "ise.py", "--report", "--board", board, "--top", top, "--out",
+              work / board], says="clock clk", env=environment())
+        need(json.loads((work / board / "result.json").read_text()) == result, "{}: --report differs".format(board))
+        for other in set(project.TOPS) - {top}:
             called = run_ise(work, "{}-{}".format(board, other), ["--board", board, "--top", other, "--synthesise"])
             need(called == ["xst"], "{}: programs {}".format(board, called))
             number += 1
