@@ -590,8 +590,8 @@ def check_nxpython(work):
     need([c[0] for c in calls][-1] == "generateBitstream", "no bitstream of a board with pads")
     pads_fit(calls, {"pads": "known"}, "nxpython, a board with pads")
     # The reports alone, by a Python without the module.
-    call([sys.executable, HERE / "nxmap" / "nxmap.py", "--report", "--out", work / "psweep_top"], says="clock mii_tx_clk",
-         env=environment())
+    call([sys.executable, HERE / "nxmap" / "nxmap.py", "--report", "--out", work / "psweep_top"],
+         says="clock mii_tx_clk", env=environment())
     # The tool's own Python is found on PATH; one without the module is told as no tool at all.
     script = HERE / "nxmap" / "nxmap.py"
     for name, path, code, says in (("tool", BENCH, 0, "no bitstream"), ("broken", work, 3, "This needs NanoXplore")):
