@@ -43,7 +43,7 @@ architecture rtl of async_fifo is
 
   subtype t_pointer is std_logic_vector(C_TOP downto 0);
 
-  type t_memory is array (0 to 2 ** G_DEPTH_LOG2 - 1) of std_logic_vector(G_DATA_W - 1 downto 0);
+  type t_memory is array (natural range 0 to 2 ** G_DEPTH_LOG2 - 1) of std_logic_vector(G_DATA_W - 1 downto 0);
 
   -- The start value is for simulators only: in a netlist it would be one line a word.
   signal memory : t_memory
