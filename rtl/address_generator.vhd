@@ -11,7 +11,8 @@
 --   Rectified: G_RECTIFIED = 1: rows of both images fall on rows of samples. A sample between two rows counts as not
 --              loaded: not usable, and an error of the window if it is inside both images
 --   Table    : 8 words a plane, see docs/interfaces.md; written while no sample is in work
---   Reset    : clears the strobes on their way and usable_y; positions have no reset
+--   Rest     : m_row_* are 0 from the clock behind the last sample of a plane until the next row
+--   Reset    : clears the strobes on their way, m_row_* and usable_y; positions have no reset
 --   Golden   : sw/golden/address_generator.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -86,28 +87,6 @@ architecture rtl of address_generator is
   constant C_ROW_W  : integer := clog2(bank_depth(2, G_IMG_ROWS, G_RECTIFIED)); -- of the number of a bank's row
   constant C_BANK_W : integer := bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
 
-  -- Sum of v * 2^k over every second set bit k of C_PITCH, beginning with the set bit number `phase`: the sum of both
-  -- phases is v * C_PITCH. Two short adder chains, so that neither a multiplier is needed nor a long path.
-  function half_product (v : unsigned; phase : natural) return unsigned is
-    variable v_sum     : unsigned(C_BANK_W - 1 downto 0);
-    variable v_rest    : integer;
-    variable v_ordinal : integer;
-  begin
-    v_sum     := (others => '0');
-    v_rest    := C_PITCH;
-    v_ordinal := 0;
-    for k in 0 to C_BANK_W - 1 loop
-      if v_rest mod 2 = 1 then
-        if v_ordinal mod 2 = phase then
-          v_sum := v_sum + shift_left(v, k);
-        end if;
-        v_ordinal := v_ordinal + 1;
-      end if;
-      v_rest := v_rest / 2;
-    end loop;
-    return v_sum;
-  end function half_product;
-
   -- Strobes on their way: row(n) is '1' n clocks after the strobe of a row. These are also the clock numbers below.
   signal row         : std_logic_vector(8 downto 0);
   signal valid       : std_logic_vector(8 downto 1);
@@ -136,11 +115,13 @@ architecture rtl of address_generator is
   signal y_loaded_now : std_logic;
   signal y_inside     : std_logic; -- both images, once clock 5 has come
   signal y_loaded     : std_logic;
-  signal y_half       : unsigned(C_BANK_W - 1 downto 0);
-  signal product_a    : unsigned(C_BANK_W - 1 downto 0);
-  signal product_b    : unsigned(C_BANK_W - 1 downto 0);
+  signal y_half       : unsigned(C_ROW_W - 1 downto 0);
+  signal product      : unsigned(C_BANK_W - 1 downto 0);
   signal row_now      : unsigned(C_BANK_W - 1 downto 0);
+  signal y_is_odd     : std_logic; -- of the image that row_now is of
+  signal row_up       : unsigned(C_BANK_W - 1 downto 0); -- as row_now, of the even one of rows yi, yi+1
   signal row_left     : unsigned(C_BANK_W - 1 downto 0);
+  signal row_left_up  : unsigned(C_BANK_W - 1 downto 0);
 
   -- Clocks 6 - 8: steps. They are 0 in clock 7, when the positions restart.
   signal next_dx_left : unsigned(C_STEP_W - 1 downto 0);
@@ -159,6 +140,7 @@ architecture rtl of address_generator is
   signal right_le_hi   : std_logic;
   signal right_loaded  : std_logic;
   signal out_valid     : std_logic;
+  signal out_last      : std_logic;
   signal out_inside_y  : std_logic;
   signal out_loaded_y  : std_logic;
   signal out_inside_x  : std_logic;
@@ -235,7 +217,7 @@ begin
       plane_last      <= plane_last(7 downto 1) & s_plane_last;
       out_valid       <= valid(8);
       m_row_first     <= row(8);
-      m_plane_last    <= plane_last(8);
+      out_last        <= plane_last(8);
       if row(7) = '1' then
         plane_first <= s_plane_first;
       end if;
@@ -318,14 +300,17 @@ begin
   y_inside_now <= at_least(y_newer, y_lo) and at_most(y_newer, y_hi);
   y_loaded_now <= is_loaded(y_newer, win_last_row) and to_bit(G_RECTIFIED = 0 or unsigned(fraction_of(y_newer)) = 0);
   -- Higher bits are 0 where the sample is loaded.
-  y_half       <= resize(y_newer(C_POS_FRAC + C_ROW_W - G_RECTIFIED downto C_POS_FRAC + 1 - G_RECTIFIED), C_BANK_W);
+  y_half       <= y_newer(C_POS_FRAC + C_ROW_W - G_RECTIFIED downto C_POS_FRAC + 1 - G_RECTIFIED);
+  -- One adder for both images, the left one in clock 5.
+  y_is_odd     <= y_older(C_POS_FRAC) when row(5) = '1' else y_newer(C_POS_FRAC);
+  row_up       <= row_now + C_PITCH when G_RECTIFIED = 0 and y_is_odd = '1' else row_now;
 
   p_row : process (clk)
   begin
     if rising_edge(clk) then
-      product_a <= half_product(y_half, 0);
-      product_b <= half_product(y_half, 1);
-      row_now   <= product_a + product_b;
+      -- A DSP block with its registers.
+      product <= resize(y_half * to_unsigned(C_PITCH, clog2(C_PITCH + 1)), C_BANK_W);
+      row_now <= product;
       if row(3) = '1' then
         y_inside <= y_inside_now;
         y_loaded <= y_loaded_now;
@@ -334,7 +319,8 @@ begin
         y_loaded <= y_loaded and y_loaded_now;
       end if;
       if row(5) = '1' then
-        row_left <= row_now;
+        row_left    <= row_now;
+        row_left_up <= row_up;
       end if;
       if row(8) = '1' then
         m_yi_left        <= std_logic_vector(floor_of(y_older));
@@ -343,16 +329,17 @@ begin
         m_fy_right       <= fraction_between_rows(y_newer);
         m_row_odd_left   <= std_logic_vector(row_left);
         m_row_odd_right  <= std_logic_vector(row_now);
-        m_row_even_left  <= std_logic_vector(row_left);
-        m_row_even_right <= std_logic_vector(row_now);
-        if G_RECTIFIED = 0 and y_older(C_POS_FRAC) = '1' then
-          m_row_even_left <= std_logic_vector(row_left + C_PITCH);
-        end if;
-        if G_RECTIFIED = 0 and y_newer(C_POS_FRAC) = '1' then
-          m_row_even_right <= std_logic_vector(row_now + C_PITCH);
-        end if;
+        m_row_even_left  <= std_logic_vector(row_left_up);
+        m_row_even_right <= std_logic_vector(row_up);
         out_inside_y <= y_inside;
         out_loaded_y <= y_loaded;
+      end if;
+      -- Behind a plane, so that storage adds nothing to the addresses of pixels that are loaded.
+      if rst = '1' or (out_valid = '1' and out_last = '1' and row(8) = '0') then
+        m_row_odd_left   <= (others => '0');
+        m_row_odd_right  <= (others => '0');
+        m_row_even_left  <= (others => '0');
+        m_row_even_right <= (others => '0');
       end if;
       if rst = '1' then
         out_inside_y <= '0';
@@ -403,6 +390,7 @@ begin
   out_inside_x   <= left_ge_lo and left_le_hi and right_ge_lo and right_le_hi;
   out_loaded_x   <= left_loaded and right_loaded;
   m_valid        <= out_valid;
+  m_plane_last   <= out_last;
   m_usable_x     <= out_inside_x and out_loaded_x;
   m_usable_y     <= out_inside_y and out_loaded_y;
   m_window_error <= out_valid and out_inside_x and out_inside_y and not (out_loaded_x and out_loaded_y);

@@ -3,6 +3,7 @@
 psweep_pkg.vhd
 ram_sdp.vhd
 ram_2r.vhd
+ram_deep.vhd
 stream_reg.vhd
 control.vhd
 address_generator.vhd
@@ -22,7 +23,6 @@ mac_rx.vhd
 mac_tx.vhd
 packet_rx.vhd
 packet_tx.vhd
-ram_deep.vhd
 row_buffer.vhd
 map_buffer.vhd
 counters.vhd

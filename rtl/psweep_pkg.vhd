@@ -61,6 +61,11 @@ package psweep_pkg is
   -- Bits of its addresses.
   function bank_bits (cols, rows, rectified : integer) return positive;
 
+  -- Words of part n of a RAM of many words, parts being powers of two, largest first; 0: there is no such part
+  -- (ram_deep, ram_2r). And the number of parts, 1 .. 4.
+  function deep_part (depth, n : integer) return integer;
+  function deep_parts (depth : integer) return positive;
+
   -- true is '1'
   function to_bit (b : boolean) return std_logic;
 
@@ -123,6 +128,40 @@ package body psweep_pkg is
   begin
     return clog2(bank_depth(cols, rows, rectified));
   end function bank_bits;
+
+  function deep_part (depth, n : integer) return integer is
+    constant C_MOST  : integer := 4;    -- parts: a multiplexer of one LUT6 a bit
+    constant C_GRAIN : integer := 2048; -- a block of 16 or 18 bits: less is not worth a part
+    constant C_LEAST : integer := 512;  -- half a block of 36 bits
+    variable v_left  : integer;
+    variable v_size  : integer;
+  begin
+    v_left := depth;
+    v_size := 0;
+    for i in 0 to n loop
+      if v_left <= 0 then
+        v_size := 0;
+      elsif i = 0 and v_left <= C_GRAIN then
+        v_size := v_left;
+      else
+        v_size := 2 ** clog2(imax(v_left, C_LEAST));
+        if v_size - v_left >= C_GRAIN and i < C_MOST - 1 then
+          v_size := v_size / 2;
+        end if;
+      end if;
+      v_left := v_left - v_size;
+    end loop;
+    return v_size;
+  end function deep_part;
+
+  function deep_parts (depth : integer) return positive is
+    variable v_count : positive := 1;
+  begin
+    while deep_part(depth, v_count) > 0 loop
+      v_count := v_count + 1;
+    end loop;
+    return v_count;
+  end function deep_parts;
 
   function to_bit (b : boolean) return std_logic is
   begin

@@ -3,6 +3,7 @@
 --         a tile is swept nobody writes, so both ports of one block RAM are free to read.
 --   Rate      : a: one write or read per clock; b: one read per clock
 --   Latency   : 2 clocks from a_addr to a_rdata and from b_addr to b_rdata (with the RAM's output register)
+--   Parts     : as ram_deep; the choice among them lies in front of the second register
 --   Collision : in the clock of a write a_rdata is undefined, and so is b_rdata if b_addr is the word written ('X' in
 --               simulation)
 --   Addresses : 0 .. G_DEPTH-1 in every clock, whether or not the data are used; beyond, a simulation stops
@@ -30,17 +31,41 @@ end entity ram_2r;
 
 architecture rtl of ram_2r is
 
-  type t_memory is array (0 to G_DEPTH - 1) of std_logic_vector(G_DATA_W - 1 downto 0);
+  constant C_ADDR_W : integer := clog2(G_DEPTH);
+  constant C_PARTS  : integer := deep_parts(G_DEPTH);
 
-  -- The start value is for simulators only: in a netlist it would be one line a word.
-  signal memory : t_memory
-  -- synthesis translate_off
-    := (others => (others => '0'))
-  -- synthesis translate_on
-    ;
+  subtype t_parts is std_logic_vector(C_PARTS downto 0);
 
-  signal a_word : std_logic_vector(G_DATA_W - 1 downto 0);
-  signal b_word : std_logic_vector(G_DATA_W - 1 downto 0);
+  -- Bit n: the address is not in a part before n (see ram_deep).
+  function behind (address : std_logic_vector(C_ADDR_W - 1 downto 0)) return std_logic_vector is
+    variable v_behind : t_parts;
+  begin
+    v_behind    := (others => '0');
+    v_behind(0) := '1';
+    for i in 1 to C_PARTS - 1 loop
+      v_behind(i) := v_behind(i - 1) and address(clog2(deep_part(G_DEPTH, i - 1)));
+    end loop;
+    return v_behind;
+  end function behind;
+
+  -- The word of the last part that the address is not before.
+  function pick (words : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0); part : t_parts) return std_logic_vector is
+    variable v_word : std_logic_vector(G_DATA_W - 1 downto 0);
+  begin
+    v_word := words(G_DATA_W - 1 downto 0);
+    for i in 1 to C_PARTS - 1 loop
+      if part(i) = '1' then
+        v_word := words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
+      end if;
+    end loop;
+    return v_word;
+  end function pick;
+
+  signal a_now   : t_parts;
+  signal a_part  : t_parts;
+  signal b_part  : t_parts;
+  signal a_words : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  signal b_words : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
 
 begin
 
@@ -51,29 +76,71 @@ begin
     report "ram_2r: G_DEPTH=" & integer'image(G_DEPTH) & " below 1"
     severity failure;
 
-  p_memory : process (clk)
+  a_now <= behind(a_addr);
+
+  g_parts : for i in 0 to C_PARTS - 1 generate
+    constant C_SIZE   : integer := deep_part(G_DEPTH, i);
+    constant C_PART_W : integer := clog2(C_SIZE);
+
+    type t_memory is array (0 to C_SIZE - 1) of std_logic_vector(G_DATA_W - 1 downto 0);
+
+    -- The start value is for simulators only: in a netlist it would be one line a word.
+    signal memory : t_memory
+    -- synthesis translate_off
+      := (others => (others => '0'))
+    -- synthesis translate_on
+      ;
+
+    signal we     : std_logic;
+    signal a_low  : std_logic_vector(C_PART_W - 1 downto 0);
+    signal b_low  : std_logic_vector(C_PART_W - 1 downto 0);
+    signal a_word : std_logic_vector(G_DATA_W - 1 downto 0);
+    signal b_word : std_logic_vector(G_DATA_W - 1 downto 0);
+  begin
+
+    we    <= a_we and a_now(i) and not a_now(i + 1);
+    a_low <= a_addr(C_PART_W - 1 downto 0);
+    b_low <= b_addr(C_PART_W - 1 downto 0);
+
+    p_memory : process (clk)
+    begin
+      if rising_edge(clk) then
+        if we = '1' then
+          memory(to_integer(unsigned(a_low))) <= a_wdata;
+          a_word <= (others => 'X');
+        else
+          a_word <= memory(to_integer(unsigned(a_low)));
+        end if;
+        if we = '1' and a_low = b_low then
+          b_word <= (others => 'X');
+        else
+          b_word <= memory(to_integer(unsigned(b_low)));
+        end if;
+      end if;
+    end process p_memory;
+
+    a_words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W) <= a_word;
+    b_words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W) <= b_word;
+
+  end generate g_parts;
+
+  p_pick : process (clk)
   begin
     if rising_edge(clk) then
-      if a_we = '1' then
-        memory(to_integer(unsigned(a_addr))) <= a_wdata;
-        a_word <= (others => 'X');
-      else
-        a_word <= memory(to_integer(unsigned(a_addr)));
-      end if;
-      if a_we = '1' and a_addr = b_addr then
-        b_word <= (others => 'X');
-      else
-        b_word <= memory(to_integer(unsigned(b_addr)));
-      end if;
-      a_rdata <= a_word;
-      b_rdata <= b_word;
+      a_part  <= a_now;
+      b_part  <= behind(b_addr);
+      a_rdata <= pick(a_words, a_part);
+      b_rdata <= pick(b_words, b_part);
     end if;
-  end process p_memory;
+  end process p_pick;
 
   -- synthesis translate_off
   p_rules : process (clk)
   begin
     if rising_edge(clk) then
+      assert to_integer(unsigned(a_addr)) < G_DEPTH and to_integer(unsigned(b_addr)) < G_DEPTH
+        report "ram_2r: address beyond G_DEPTH"
+        severity failure;
       assert a_we /= 'X' and (a_we /= '1' or not is_x(a_addr))
         report "ram_2r: a write with an unknown enable or address"
         severity failure;

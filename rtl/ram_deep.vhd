@@ -3,7 +3,7 @@
 --           bits, ..), so a part needs no multiplexer, where a RAM of any depth is made of as many short and wide
 --           blocks as its depth takes, with a multiplexer over all of them.
 --   Parts     : at most four, the largest power of two that fits first: 49280 words are 32768 + 16384 + 512. One more
---               power of two instead of a rest that is less than 2048 words from it: 32760 words are 32768
+--               power of two instead of a rest that is less than 2048 words from it: 32760 words are 32768 (deep_part)
 --   G_NINES   : so many low bits (a multiple of 9) of parts from 8192 words on are kept in a RAM of their own, which
 --               fits into blocks of 4096 * 9 bits: 8 blocks for 9 bits of 32768 words, not 9, and a multiplexer. 0: no
 --   Others    : latency 1, collision, addresses and reset as ram_sdp
@@ -30,46 +30,7 @@ end entity ram_deep;
 
 architecture rtl of ram_deep is
 
-  constant C_MOST  : integer := 4;    -- parts: a multiplexer of one LUT6 a bit
-  constant C_GRAIN : integer := 2048; -- a block of 16 or 18 bits: less is not worth a part
-  constant C_LEAST : integer := 512;  -- half a block of 36 bits
-
-  -- Words of part n; 0: there is no such part.
-  function part_size (n : integer) return integer is
-    variable v_left : integer;
-    variable v_size : integer;
-  begin
-    v_left := G_DEPTH;
-    v_size := 0;
-    for i in 0 to n loop
-      if v_left <= 0 then
-        v_size := 0;
-      elsif i = 0 and v_left <= C_GRAIN then
-        v_size := v_left;
-      else
-        v_size := 2 ** clog2(imax(v_left, C_LEAST));
-        if v_size - v_left >= C_GRAIN and i < C_MOST - 1 then
-          v_size := v_size / 2;
-        end if;
-      end if;
-      v_left := v_left - v_size;
-    end loop;
-    return v_size;
-  end function part_size;
-
-  function part_count return integer is
-    variable v_count : integer;
-  begin
-    v_count := 1;
-    for i in 1 to C_MOST - 1 loop
-      if part_size(i) > 0 then
-        v_count := v_count + 1;
-      end if;
-    end loop;
-    return v_count;
-  end function part_count;
-
-  constant C_PARTS : integer := part_count;
+  constant C_PARTS : integer := deep_parts(G_DEPTH);
 
   subtype t_address is std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
 
@@ -83,7 +44,7 @@ architecture rtl of ram_deep is
     v_behind    := (others => '0');
     v_behind(0) := '1';
     for i in 1 to C_PARTS - 1 loop
-      v_behind(i) := v_behind(i - 1) and address(clog2(part_size(i - 1)));
+      v_behind(i) := v_behind(i - 1) and address(clog2(deep_part(G_DEPTH, i - 1)));
     end loop;
     return v_behind;
   end function behind;
@@ -107,7 +68,7 @@ begin
   w_behind <= behind(waddr);
 
   g_parts : for i in 0 to C_PARTS - 1 generate
-    constant C_SIZE   : integer := part_size(i);
+    constant C_SIZE   : integer := deep_part(G_DEPTH, i);
     constant C_PART_W : integer := clog2(C_SIZE);
     constant C_SPLIT  : boolean := G_NINES > 0 and G_NINES < G_DATA_W and C_SIZE >= 8192;
     signal we_part : std_logic;

@@ -7,7 +7,8 @@
 --              lanes 0 and 1 read the same banks, each through its own port, any sample at any time (ram_2r). Lanes 2
 --              and 3 have a second copy. So two lanes need no more RAM than one, and no lane depends on where another
 --              reads
---   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator
+--   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator. With
+--              lanes that write and read through one port the row part must be 0 while a pixel is written
 --   Rectified: G_RECTIFIED = 1: samples lie on rows of pixels; two banks an image, by the parity of x, hold all rows:
 --              y * G_IMG_COLS/2 + x div 2. Same RAM, but half the addresses and a 2:1 choice of pixels. p01, p11 are 0
 --   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W) passed through
@@ -112,9 +113,13 @@ architecture rtl of storage is
   signal s1_addr_1 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
   signal s1_addr_2 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
   signal s1_addr_3 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
+  signal s2_word_0 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_0 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s2_word_1 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_1 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s2_word_2 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_2 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  signal s2_word_3 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_3 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
   signal s4_p00    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
   signal s4_p10    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
@@ -123,13 +128,11 @@ architecture rtl of storage is
 
   -- Address of the even (round_up = xi mod 2) or odd (round_up = 0) one of columns xi, xi+1. The increment enters as a
   -- carry, from a bit that is cut off again, so this is one adder.
-  function bank_address (row_part : std_logic_vector; xi : std_logic_vector; round_up : std_logic)
+  function bank_address (row_part : std_logic_vector; column : std_logic_vector; round_up : std_logic)
     return std_logic_vector is
-    variable v_column : unsigned(C_BANK_W - 1 downto 0);
-    variable v_sum    : unsigned(C_BANK_W downto 0);
+    variable v_sum : unsigned(C_BANK_W downto 0);
   begin
-    v_column := resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W);
-    v_sum    := unsigned(row_part & '1') + (v_column & round_up);
+    v_sum := unsigned(row_part & '1') + unsigned(column & round_up);
     return std_logic_vector(v_sum(C_BANK_W downto 1));
   end function bank_address;
 
@@ -217,27 +220,27 @@ begin
     signal p10      : std_logic_vector(G_PIX_W - 1 downto 0);
     signal p01      : std_logic_vector(G_PIX_W - 1 downto 0);
     signal p11      : std_logic_vector(G_PIX_W - 1 downto 0);
-    signal writes   : std_logic; -- the port of an even lane writes the pixel that comes
+    -- The port of an even lane writes the pixel that comes: its address takes the column's place, the row's is 0.
+    signal writes   : std_logic;
+    signal column   : std_logic_vector(C_BANK_W - 1 downto 0);
+    signal round_up : std_logic;
   begin
 
     row_even <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     row_odd  <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     xi       <= s0_xi(n * C_INT_W + C_COL_W - 1 downto n * C_INT_W);
     writes   <= load_valid and to_bit(G_LANES > 1 and n mod 2 = 0);
+    column   <= write_next when writes = '1' else std_logic_vector(resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W));
+    round_up <= xi(0) and not writes;
 
     p_read : process (clk)
     begin
       if rising_edge(clk) then
-        addr_0 <= bank_address(row_even, xi, xi(0));
-        addr_1 <= bank_address(row_even, xi, '0');
-        addr_2 <= bank_address(row_odd, xi, xi(0));
-        addr_3 <= bank_address(row_odd, xi, '0');
-        if writes = '1' then
-          addr_0 <= write_next;
-          addr_1 <= write_next;
-          addr_2 <= write_next;
-          addr_3 <= write_next;
-        elsif s0_unusable(n mod G_LANES) = '1' then -- keeps addresses legal
+        addr_0 <= bank_address(row_even, column, round_up);
+        addr_1 <= bank_address(row_even, column, '0');
+        addr_2 <= bank_address(row_odd, column, round_up);
+        addr_3 <= bank_address(row_odd, column, '0');
+        if writes = '0' and s0_unusable(n mod G_LANES) = '1' then -- keeps addresses legal
           addr_0 <= (others => '0');
           addr_1 <= (others => '0');
           addr_2 <= (others => '0');
@@ -275,50 +278,50 @@ begin
 
     g_one : if G_LANES = 1 generate
 
-      u_bank_0 : entity work.ram_sdp
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+      u_bank_0 : entity work.ram_deep
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
         port map (
           clk   => clk,
           we    => write_bank(0),
           waddr => write_addr,
           wdata => write_pixel,
           raddr => s1_addr_0((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s3_word_0((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+          rdata => s2_word_0((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
         );
 
-      u_bank_1 : entity work.ram_sdp
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+      u_bank_1 : entity work.ram_deep
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
         port map (
           clk   => clk,
           we    => write_bank(1),
           waddr => write_addr,
           wdata => write_pixel,
           raddr => s1_addr_1((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s3_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+          rdata => s2_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
         );
 
       g_lower : if G_RECTIFIED = 0 generate
 
-        u_bank_2 : entity work.ram_sdp
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+        u_bank_2 : entity work.ram_deep
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
           port map (
             clk   => clk,
             we    => write_bank(2),
             waddr => write_addr,
             wdata => write_pixel,
             raddr => s1_addr_2((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-            rdata => s3_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+            rdata => s2_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
           );
 
-        u_bank_3 : entity work.ram_sdp
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
+        u_bank_3 : entity work.ram_deep
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
           port map (
             clk   => clk,
             we    => write_bank(3),
             waddr => write_addr,
             wdata => write_pixel,
             raddr => s1_addr_3((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-            rdata => s3_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+            rdata => s2_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
           );
 
       end generate g_lower;
@@ -390,7 +393,26 @@ begin
 
   end generate g_image;
 
-  g_no_lower : if G_RECTIFIED = 1 generate
+  g_words : if G_LANES = 1 generate
+
+    p_words : process (clk)
+    begin
+      if rising_edge(clk) then
+        s3_word_0 <= s2_word_0;
+        s3_word_1 <= s2_word_1;
+        if G_RECTIFIED = 0 then
+          s3_word_2 <= s2_word_2;
+          s3_word_3 <= s2_word_3;
+        else
+          s3_word_2 <= (others => '0');
+          s3_word_3 <= (others => '0');
+        end if;
+      end if;
+    end process p_words;
+
+  end generate g_words;
+
+  g_no_lower : if G_LANES > 1 and G_RECTIFIED = 1 generate
     s3_word_2 <= (others => '0');
     s3_word_3 <= (others => '0');
   end generate g_no_lower;
@@ -464,6 +486,13 @@ begin
       if rising_edge(clk) then
         assert load_valid /= '1' or s_valid(n) /= '1'
           report "storage: a pixel is written while samples are read"
+          severity failure;
+        assert load_valid /= '1' or G_LANES = 1 or n mod 2 = 1
+               or unsigned(s_row_even_left((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)
+                           or s_row_odd_left((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)
+                           or s_row_even_right((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)
+                           or s_row_odd_right((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)) = 0
+          report "storage: a row part that is not 0 while a pixel is written"
           severity failure;
         if valid(4) = '1' and usable_x(4) = '1' and usable_y(4) = '1' then
           for k in 0 to 1 loop

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// ram_2r, depth no power of two: both ports return what was written last, two clocks after the address, while the first
-// one writes now and then. Words read in the clock in which they are written are undefined and not compared.
+// ram_2r, depth no power of two, of one part and of three: both ports return what was written last, two clocks after
+// the address, while the first one writes now and then. Words read in the clock in which they are written are undefined
+// and not compared.
 #include <array>
 #include <deque>
 #include <random>
+#include <type_traits>
 #include <vector>
 
 #include "Vram_2r_a.h"
+#include "Vram_2r_deep.h"
 #include "support/catch.hpp"
 #include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
@@ -14,8 +17,11 @@
 using namespace psweep;
 using namespace psweep::tb;
 
-TEST_CASE("ram_2r: two readers, one of which writes") {
-  constexpr int kDepth = 37;
+namespace {
+
+// Addresses: `around` words on both sides of each of these places.
+template <class Dut>
+void run(uint32_t depth, const std::vector<uint32_t>& places, uint32_t around) {
   constexpr size_t kLatency = 2;
   const uint32_t seed = test_seed();
   INFO("seed " << seed);
@@ -23,7 +29,7 @@ TEST_CASE("ram_2r: two readers, one of which writes") {
   VerilatedContext context;
   context.randReset(2);
   context.randSeed(static_cast<int>(seed | 1));
-  Vram_2r_a dut(&context);
+  Dut dut(&context);
   std::mt19937 random(seed);
   Scoreboard a("a_rdata"), b("b_rdata");
 
@@ -32,13 +38,17 @@ TEST_CASE("ram_2r: two readers, one of which writes") {
     uint32_t value;
   };
   std::array<std::deque<Read>, 2> pending;
-  std::vector<Read> memory(kDepth, {false, 0});
+  std::vector<Read> memory(depth, {false, 0});
+  auto address = [&] {
+    const uint32_t place = places[static_cast<uint32_t>(random()) % places.size()];
+    return (place + depth - around + static_cast<uint32_t>(random()) % (2 * around)) % depth;
+  };
   for (uint64_t clock = 0; clock < 20000; ++clock) {
     const bool we = random() % 3 == 0;
-    const uint32_t a_addr = static_cast<uint32_t>(random()) % kDepth, b_addr = static_cast<uint32_t>(random()) % kDepth;
+    const uint32_t a_addr = address(), b_addr = address();
     dut.a_we = we;
-    dut.a_addr = static_cast<CData>(a_addr);
-    dut.b_addr = static_cast<CData>(b_addr);
+    dut.a_addr = static_cast<std::remove_reference_t<decltype(dut.a_addr)>>(a_addr);
+    dut.b_addr = static_cast<std::remove_reference_t<decltype(dut.b_addr)>>(b_addr);
     dut.a_wdata = static_cast<SData>(random() & 0x1fff);
     dut.clk = 0;
     dut.eval();
@@ -62,3 +72,8 @@ TEST_CASE("ram_2r: two readers, one of which writes") {
   CHECK(a.compared() > 10000);
   CHECK(b.compared() > 15000);
 }
+
+}  // namespace
+
+TEST_CASE("ram_2r: two readers, one of which writes") { run<Vram_2r_a>(37, {0, 18}, 10); }
+TEST_CASE("ram_2r: 8192 + 4096 + 512 words") { run<Vram_2r_deep>(12320, {0, 8192, 12288}, 12); }

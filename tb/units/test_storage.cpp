@@ -111,6 +111,8 @@ struct Bench : Agent {
 
   void load(const golden::Pixels& left, const golden::Pixels& right, double stall) {
     std::bernoulli_distribution idle(stall);
+    // As behind the last sample of a plane.
+    dut.s_row_even_left = 0, dut.s_row_odd_left = 0, dut.s_row_even_right = 0, dut.s_row_odd_right = 0;
     dut.load_clear = 1;
     sim.tick();
     dut.load_clear = 0;
