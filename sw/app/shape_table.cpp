@@ -5,9 +5,10 @@
 // generics.
 //   shape_table            Markdown tables of docs/tiles.md
 //   shape_table --curve    the points of the picture: kind, Mbit, million clocks of 1, 2 and 4 lanes, columns, rows
-//   shape_table --tile C R [PIXELS PLANES]
-//                          one shape as JSON, of PIXELS x PIXELS pixels (1120) and PLANES planes (301): clocks of the
-//                          plan, useful ones, image buffer (scripts/cost/report.py)
+//   shape_table --tile C R [PIXELS PLANES [WINDOW]]
+//                          one shape as JSON, of PIXELS x PIXELS pixels (1120) and PLANES planes (301) with this window
+//                          (13): clocks of the plan, useful ones, image buffer, bits of the memories with one lane
+//                          (scripts/cost/report.py, scripts/dse)
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -34,15 +35,15 @@ struct Memory {
 std::vector<Memory> memories(const golden::Config& c) {
   const int64_t cells = int64_t{c.plane_cols} * c.plane_rows, row = c.plane_cols + c.window - 1;
   const int64_t word = 2 * c.mncc_bits + c.plane_bits() + c.frac_bits + 2;
-  // Sums of a column: of both samples, of their squares and of their product.
-  const double samples = c.window * (std::ldexp(1.0, c.sample_bits()) - 1),
-               squares = samples * (std::ldexp(1.0, c.sample_bits()) - 1);
-  auto bits = [](double most) { return static_cast<int64_t>(std::floor(std::log2(most))) + 1; };
+  // A column of the similarity's window sums: of both samples, and their squares and product halved.
+  int steps = 0;
+  while ((1 << steps) < c.window) ++steps;
+  const int64_t column = 2 * (c.sample_bits() + steps) + 2 * (2 * c.sample_bits() - 1 + steps);
   return {{"image", int64_t{8} * ((c.lanes + 1) / 2), int64_t{c.img_cols} * c.img_rows / 4, c.pix_bits},
           {"map", 1, cells, word},
           {"plane table", c.lanes, int64_t{8} * ((c.planes + c.lanes - 1) / c.lanes), 32},
           {"rows of the window", c.lanes, row * c.window, int64_t{2} * c.sample_bits()},
-          {"sums of columns", c.lanes, row, 2 * bits(samples) + 2 * bits(squares) + bits(squares)}};
+          {"sums of columns", c.lanes, row, column}};
 }
 
 // Blocks of 36 kbit in the best of their shapes, halves of them counted as halves.
@@ -187,16 +188,18 @@ int run(bool curve) {
 
 int run_tile(const std::vector<std::string>& numbers) {
   golden::Config c;
-  if (numbers.size() == 4) c.planes = std::stoi(numbers[3]);
-  const int pixels = numbers.size() == 4 ? std::stoi(numbers[2]) : 1120;
+  if (numbers.size() >= 4) c.planes = std::stoi(numbers[3]);
+  if (numbers.size() == 5) c.window = std::stoi(numbers[4]);
+  const int pixels = numbers.size() >= 4 ? std::stoi(numbers[2]) : 1120;
   const SweepSetup setup{rover_rig(pixels), {c.planes, 1.0, 4.0}, c, threshold_for(c, 0.85)};
   const Shape s = shape_of(setup, {std::stoi(numbers[0]), std::stoi(numbers[1])});
   std::printf(
-      "{\"tile\": [%d, %d], \"pixels\": %d, \"planes\": %d, \"tiles\": %zu, \"buffer\": [%d, %d], \"useful\": %llu, "
-      "\"clocks\": {\"1\": %llu, \"2\": %llu, \"4\": %llu}}\n",
-      s.size.cols, s.size.rows, pixels, c.planes, s.tiles, s.config.img_cols, s.config.img_rows,
-      static_cast<unsigned long long>(s.useful), static_cast<unsigned long long>(s.all[0]),
-      static_cast<unsigned long long>(s.all[1]), static_cast<unsigned long long>(s.all[2]));
+      "{\"tile\": [%d, %d], \"pixels\": %d, \"planes\": %d, \"window\": %d, \"tiles\": %zu, \"buffer\": [%d, %d], "
+      "\"bits\": %lld, \"useful\": %llu, \"clocks\": {\"1\": %llu, \"2\": %llu, \"4\": %llu}}\n",
+      s.size.cols, s.size.rows, pixels, c.planes, c.window, s.tiles, s.config.img_cols, s.config.img_rows,
+      static_cast<long long>(s.bits), static_cast<unsigned long long>(s.useful),
+      static_cast<unsigned long long>(s.all[0]), static_cast<unsigned long long>(s.all[1]),
+      static_cast<unsigned long long>(s.all[2]));
   return 0;
 }
 
@@ -205,9 +208,9 @@ int run_tile(const std::vector<std::string>& numbers) {
 
 int main(int argc, char** argv) {
   const std::string option = argc > 1 ? argv[1] : "";
-  const bool tile = option == "--tile" && (argc == 4 || argc == 6);
+  const bool tile = option == "--tile" && (argc == 4 || argc == 6 || argc == 7);
   if (!tile && (argc > 2 || (argc == 2 && option != "--curve"))) {
-    std::fprintf(stderr, "usage: shape_table [--curve | --tile COLS ROWS [PIXELS PLANES]]\n");
+    std::fprintf(stderr, "usage: shape_table [--curve | --tile COLS ROWS [PIXELS PLANES [WINDOW]]]\n");
     return 2;
   }
   try {

@@ -98,26 +98,34 @@ Comparison compare(const FloatImage& reference, const FloatImage& other, const I
   if (!selected.empty() && (selected.width != reference.width || selected.height != reference.height)) {
     throw InputError("selection: its size is not the reference's");
   }
-  size_t cells = 0, near = 0, far = 0, hole_in_both = 0;
+  size_t near = 0, off_1mm = 0, off_5mm = 0, far = 0, hole_in_both = 0;
   Comparison c;
   for (size_t i = 0; i < reference.data.size(); ++i) {
     if (!selected.empty() && !selected.data[i]) continue;
-    ++cells;
+    ++c.cells;
     const double a = reference.data[i], b = other.data[i];
     if (!std::isfinite(a)) {
       ++c.reference_holes;
       hole_in_both += !std::isfinite(b);
     } else if (std::isfinite(b)) {
       ++c.both;
-      near += std::abs(a - b) <= 0.00025;
-      far += std::abs(a - b) > kLarge;
+      const double error = std::abs(a - b);
+      near += error <= 0.00025;
+      off_1mm += error > 0.001;
+      off_5mm += error > 0.005;
+      far += error > kLarge;
+    } else {
+      ++c.holes_gained;
     }
   }
-  if (cells == 0) throw InputError("nothing to compare: no cell is selected");
+  if (c.cells == 0) throw InputError("nothing to compare: no cell is selected");
   c.within_quarter_mm = percent(near, c.both);
+  c.off_1mm = percent(off_1mm, c.both);
+  c.off_5mm = percent(off_5mm, c.both);
   c.off_2cm = percent(far, c.both);
+  c.holes_lost = c.reference_holes - hole_in_both;
   c.same_holes = c.reference_holes ? percent(hole_in_both, c.reference_holes) : 100;
-  c.same_coverage = percent(hole_in_both + c.both, cells);
+  c.same_coverage = percent(hole_in_both + c.both, c.cells);
   return c;
 }
 

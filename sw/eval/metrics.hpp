@@ -31,12 +31,13 @@ Metrics evaluate(const FloatImage& depth, const FloatImage& truth, const Rig& ri
                  int window);
 
 struct Comparison {
-  size_t both = 0;               // cells with a depth in both
-  double within_quarter_mm = 0;  // percent of them that differ by at most 0.25 mm
-  double off_2cm = 0;            // percent of them that differ by more than 2 cm
-  double same_holes = 0;         // percent of the reference's holes that are holes in the other, too
-  double same_coverage = 0;      // percent of all cells that are hole in both or depth in both
-  size_t reference_holes = 0;
+  size_t both = 0;                               // cells with a depth in both
+  double within_quarter_mm = 0;                  // percent of them that differ by at most 0.25 mm
+  double off_1mm = 0, off_5mm = 0, off_2cm = 0;  // percent of them that differ by more than that
+  double same_holes = 0;                         // percent of the reference's holes that are holes in the other, too
+  double same_coverage = 0;                      // percent of all cells that are hole in both or depth in both
+  size_t cells = 0, reference_holes = 0;
+  size_t holes_gained = 0, holes_lost = 0;  // cells that are hole only in the other, only in the reference
 };
 
 // Cells where `selected` is not 0, or all if it is empty. InputError if sizes differ or there is nothing to compare.

@@ -123,14 +123,20 @@ TEST_CASE("metrics refuse what they cannot judge") {
 TEST_CASE("comparison of two results") {
   FloatImage a(10, 10, 2.0f), b(10, 10, 2.0f);
   b.at(0, 0) = 2.0002f;  // within a quarter of a millimetre
-  b.at(1, 0) = 2.001f;   // neither
+  b.at(1, 0) = 2.0009f;  // neither
   b.at(2, 0) = 2.03f;    // off
+  b.at(6, 0) = 2.004f;   // more than 1 mm, less than 5 mm
   a.at(3, 0) = a.at(4, 0) = b.at(4, 0) = b.at(5, 0) = kInf;
   const Comparison c = compare(a, b);
   CHECK(c.both == 97);
   CHECK(c.reference_holes == 2);
-  CHECK(c.within_quarter_mm == approx(100.0 * 95 / 97));
+  CHECK(c.cells == 100);
+  CHECK(c.within_quarter_mm == approx(100.0 * 94 / 97));
+  CHECK(c.off_1mm == approx(100.0 * 2 / 97));
+  CHECK(c.off_5mm == approx(100.0 / 97));
   CHECK(c.off_2cm == approx(100.0 / 97));
+  CHECK(c.holes_gained == 1);
+  CHECK(c.holes_lost == 1);
   CHECK(c.same_holes == approx(50));
   CHECK(c.same_coverage == approx(98));
   Image<uint8_t> one(10, 10);

@@ -3,6 +3,9 @@
 //   psweep_accuracy [--size N] [--threads N] [--seeds 1,2,3] [--kind rocky|flat] [--save DIR] EXPERIMENT ...
 // Experiments: float, fixed, formats, mncc, rules, cleanup. --save writes pairs, depth and error maps as PNG files into
 // DIR.
+//   psweep_accuracy --scene DIR [--window M] [--threads N] --csv ENGINE:MNCC:INTERP:FRAC:WEIGHT ...
+// One scene that 'psweep render' wrote, as comma-separated values (make dse): every format against float and truth.
+// ENGINE: float (numbers do not matter), mncc (float but for MNCC and FRAC, figure 8 of the paper), fixed (bit-true).
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +13,7 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -18,6 +22,7 @@
 #include "eval/metrics.hpp"
 #include "fast/fast.hpp"
 #include "io/image_io.hpp"
+#include "io/pfm.hpp"
 #include "io/picture.hpp"
 #include "plan/planner.hpp"
 #include "reference/reference.hpp"
@@ -32,7 +37,9 @@ constexpr double kThreshold = 0.85;
 struct Options {
   int size = 1120, threads = 2;
   std::vector<uint64_t> seeds{1, 2, 3};
-  std::string save, kind;  // empty: save nothing, both kinds
+  int window = kWindow;
+  bool csv = false;
+  std::string save, kind, scene;  // empty: save nothing, both kinds, render
   std::vector<std::string> experiments;
   bool wants(const std::string& name) const {
     for (const auto& e : experiments) {
@@ -170,7 +177,13 @@ Options parse(int argc, char** argv) {
       if (++i == argc) throw InputError(word + ": expected a value");
       return argv[i];
     };
-    if (word == "--size") {
+    if (word == "--csv") {
+      o.csv = true;
+    } else if (word == "--scene") {
+      o.scene = value();
+    } else if (word == "--window") {
+      o.window = std::atoi(value().c_str());
+    } else if (word == "--size") {
       o.size = std::atoi(value().c_str());
     } else if (word == "--threads") {
       o.threads = std::atoi(value().c_str());
@@ -191,12 +204,78 @@ Options parse(int argc, char** argv) {
   return o;
 }
 
+// Fields of ENGINE:MNCC:INTERP:FRAC:WEIGHT.
+struct Format {
+  std::string engine;
+  golden::Config config;
+};
+
+Format parse_format(const std::string& text) {
+  std::istringstream in(text);
+  Format f;
+  std::getline(in, f.engine, ':');
+  char colon[3] = {};
+  in >> f.config.mncc_bits >> colon[0] >> f.config.interp_frac >> colon[1] >> f.config.frac_bits >> colon[2] >>
+      f.config.weight_bits;
+  const bool known = f.engine == "float" || f.engine == "mncc" || f.engine == "fixed";
+  if (!in || !in.eof() || !known || std::string(colon, 3) != ":::") {
+    throw InputError("'" + text + "': expected float|mncc|fixed:MNCC:INTERP:FRAC:WEIGHT");
+  }
+  return f;
+}
+
+void print_csv(const Options& options) {
+  if (options.experiments.empty()) throw InputError("--csv: expected formats");
+  const Gray left = read_gray(options.scene + "/left.png"), right = read_gray(options.scene + "/right.png");
+  const FloatImage truth = read_pfm(options.scene + "/truth.pfm");
+  const Rig rig = rover_rig(left.width);
+  const PlaneSpacing spacing;
+  const Image<uint8_t> selected = evaluated_cells(truth, rig, spacing, options.window);
+  const auto floating = [&](const FloatOptions& o) {
+    return run_float(left, right, rig, spacing, options.window, kThreshold, o, options.threads);
+  };
+  const DepthResult plain = floating({});
+  std::printf(
+      "size,window,engine,mncc,interp,frac,weight,M1_mm,M2a_percent,M2b_mm,M3_percent,M4_px,rms_mm,cells,both,"
+      "over_quarter_mm_percent,over_1mm_percent,over_5mm_percent,over_2cm_percent,float_holes,holes_gained,"
+      "holes_lost\n");
+  for (const auto& text : options.experiments) {
+    const Format f = parse_format(text);
+    DepthResult r = plain;
+    if (f.engine == "mncc") {
+      FloatOptions o;
+      o.mncc_bits = f.config.mncc_bits;
+      o.frac_bits = f.config.frac_bits;
+      r = floating(o);
+    } else if (f.engine == "fixed") {
+      SweepSetup setup{rig, spacing, f.config, 0};
+      setup.format.window = options.window;
+      setup.threshold = threshold_for(setup.format, kThreshold);
+      FastOptions o;
+      o.threads = options.threads;
+      r = to_result(setup, run_fixed(left, right, setup, o));
+    }
+    const Metrics m = evaluate(r.depth, truth, rig, spacing, options.window);
+    const Comparison c = compare(plain.depth, r.depth, selected);
+    std::printf("%d,%d,%s,%d,%d,%d,%d,%.4f,%.4f,%.3f,%.4f,%.3f,%.4f,%zu,%zu,%.6f,%.6f,%.6f,%.6f,%zu,%zu,%zu\n",
+                rig.width, options.window, f.engine.c_str(), f.config.mncc_bits, f.config.interp_frac,
+                f.config.frac_bits, f.config.weight_bits, m.M1_mm, m.M2a_percent, m.M2b_mm, m.M3_percent, m.M4_px,
+                m.rms_mm, c.cells, c.both, 100 - c.within_quarter_mm, c.off_1mm, c.off_5mm, c.off_2cm,
+                c.reference_holes, c.holes_gained, c.holes_lost);
+    std::fflush(stdout);
+  }
+}
+
 }  // namespace
 }  // namespace psweep
 
 int main(int argc, char** argv) {
   try {
     const psweep::Options options = psweep::parse(argc, argv);
+    if (options.csv) {
+      psweep::print_csv(options);
+      return 0;
+    }
     std::printf(
         "| scene | engine | M1 mm | M2.a %% | M2.b mm | M3 %% | M4 px | RMS mm | <= 0.25 mm of float %% | "
         "> 2 cm %% | float's holes kept %% | hole or depth as float %% |\n");
