@@ -87,6 +87,19 @@ architecture rtl of address_generator is
   constant C_ROW_W  : integer := clog2(bank_depth(2, G_IMG_ROWS, G_RECTIFIED)); -- of the number of a bank's row
   constant C_BANK_W : integer := bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
 
+  -- Words of the table. A few more, up to a power of two, save the multiplexer behind its blocks.
+  function table_words return integer is
+    constant C_USED  : integer := 8 * imax(G_PLANES, 2);
+    constant C_WHOLE : integer := 2 ** clog2(C_USED);
+  begin
+    if C_WHOLE - C_USED < 1024 then
+      return C_WHOLE;
+    end if;
+    return C_USED;
+  end function table_words;
+
+  constant C_TABLE : integer := table_words;
+
   -- Strobes on their way: row(n) is '1' n clocks after the strobe of a row. These are also the clock numbers below.
   signal row         : std_logic_vector(8 downto 0);
   signal valid       : std_logic_vector(8 downto 1);
@@ -243,7 +256,7 @@ begin
   u_table : entity work.ram_sdp
     generic map (
       G_DATA_W  => 32,
-      G_DEPTH   => 8 * imax(G_PLANES, 2),
+      G_DEPTH   => C_TABLE,
       G_LATENCY => 2
     )
     port map (

@@ -230,7 +230,8 @@ begin
     row_odd  <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     xi       <= s0_xi(n * C_INT_W + C_COL_W - 1 downto n * C_INT_W);
     writes   <= load_valid and to_bit(G_LANES > 1 and n mod 2 = 0);
-    column   <= write_next when writes = '1' else std_logic_vector(resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W));
+    column   <= write_next when writes = '1'
+                else std_logic_vector(resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W));
     round_up <= xi(0) and not writes;
 
     p_read : process (clk)

@@ -108,8 +108,8 @@ architecture rtl of updating is
   signal s1_before   : unsigned(C_SET_W + C_LANE_W - 1 downto 0); -- the plane before lane 0's
 
   -- One stage per lane from s2 on. Of each signal element n enters the stage of lane n, and element G_LANES is s3, the
-  -- word to be written but for its fraction: 2 best, prev, flags; the last parabola's operands best - prev and
-  -- 2 best - prev - v, and whether there is one.
+  -- word to be written but for its fraction, and whether there is a parabola. Of the parabola the lanes pass on the
+  -- values beside the best one; the last of them makes best - prev and 2 best - prev - v.
   signal way_in_valid  : std_logic_vector(G_LANES downto 0);
   signal way_in_last   : std_logic_vector(G_LANES downto 0);
   signal way_set       : std_logic_vector((G_LANES + 1) * C_SET_W - 1 downto 0);
@@ -121,10 +121,12 @@ architecture rtl of updating is
   signal way_prev_ok   : std_logic_vector(G_LANES downto 0);
   signal way_before    : std_logic_vector(G_LANES downto 0); -- the best plane is the one before this lane's
   signal way_parabola  : std_logic_vector(G_LANES downto 0);
-  signal way_rise      : std_logic_vector((G_LANES + 1) * G_MNCC_W - 1 downto 0);
-  signal way_both      : std_logic_vector((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto 0);
+  signal way_lower     : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0); -- V of the plane before the best one
+  signal way_upper     : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0); -- and of the one behind it
 
   signal s3_word : std_logic_vector(C_WORD_W - 1 downto 0);
+  signal s3_rise : unsigned(G_MNCC_W - 1 downto 0);
+  signal s3_both : unsigned(G_MNCC_W downto 0);
   signal s3_num  : std_logic_vector(G_MNCC_W + 1 downto 0);
   signal s3_wait : std_logic_vector(C_WAIT_W - 1 downto 0);
 
@@ -173,11 +175,10 @@ begin
   -- Map --------------------------------------------------------------------------------------------------------------
   raddr <= std_logic_vector(held_cell) when fetched = '1' and out_ready = '0' else std_logic_vector(read_cell);
 
-  u_map : entity work.ram_sdp
+  u_map : entity work.ram_deep
     generic map (
-      G_DATA_W  => C_WORD_W,
-      G_DEPTH   => imax(G_CELLS, 2), -- GHDL 2.0 cannot convert a RAM of one word
-      G_LATENCY => 1
+      G_DATA_W => C_WORD_W,
+      G_DEPTH  => imax(G_CELLS, 2)  -- GHDL 2.0 cannot convert a RAM of one word
     )
     port map (
       clk   => clk,
@@ -277,8 +278,8 @@ begin
   end process p_first;
 
   way_parabola(0)                        <= '0';
-  way_rise(G_MNCC_W - 1 downto 0)        <= (others => '0');
-  way_both(G_MNCC_W downto 0)            <= (others => '0');
+  way_lower(G_MNCC_W - 1 downto 0)       <= (others => '0');
+  way_upper(G_MNCC_W - 1 downto 0)       <= (others => '0');
 
   g_lane : for n in 0 to G_LANES - 1 generate
     -- What the lane brings waits n + 1 clocks for its turn: sideband is {on, inside, textured, v}.
@@ -295,8 +296,6 @@ begin
     signal old_prev      : unsigned(G_MNCC_W - 1 downto 0);
     signal old_plane     : std_logic_vector(C_PLANE_W - 1 downto 0);
     signal old_frac      : std_logic_vector(G_FRAC_W - 1 downto 0);
-    signal old_rise      : std_logic_vector(G_MNCC_W - 1 downto 0);
-    signal old_both      : std_logic_vector(G_MNCC_W downto 0);
     signal better        : std_logic;
     signal won           : std_logic; -- there is a winner
     signal adjacent      : std_logic; -- and it is the plane before this one
@@ -304,8 +303,8 @@ begin
     signal new_prev      : unsigned(G_MNCC_W - 1 downto 0);
     signal new_plane     : std_logic_vector(C_PLANE_W - 1 downto 0);
     signal new_frac      : std_logic_vector(G_FRAC_W - 1 downto 0);
-    signal new_rise      : std_logic_vector(G_MNCC_W - 1 downto 0);
-    signal new_both      : std_logic_vector(G_MNCC_W downto 0);
+    signal lower         : unsigned(G_MNCC_W - 1 downto 0);
+    signal upper         : unsigned(G_MNCC_W - 1 downto 0);
     signal new_local_max : std_logic;
     signal new_prev_ok   : std_logic;
     signal new_before    : std_logic;
@@ -337,12 +336,15 @@ begin
     old_prev  <= unsigned(way_prev((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W));
     old_plane <= way_plane((n + 1) * C_PLANE_W - 1 downto n * C_PLANE_W);
     old_frac  <= way_frac((n + 1) * G_FRAC_W - 1 downto n * G_FRAC_W);
-    old_rise  <= way_rise((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W);
-    old_both  <= way_both((n + 1) * (G_MNCC_W + 1) - 1 downto n * (G_MNCC_W + 1));
 
     better   <= inside and to_bit(v > old_best) and on_q;
     won      <= to_bit(old_best /= 0);
     adjacent <= won and way_before(n) and on_q;
+    -- Without a parabola these mean nothing: the first lane need not choose.
+    lower    <= old_prev when n = 0 or adjacent = '1'
+                else unsigned(way_lower((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W));
+    upper    <= v when n = 0 or adjacent = '1'
+                else unsigned(way_upper((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W));
 
     p_update : process (clk)
     begin
@@ -377,14 +379,6 @@ begin
             new_frac(1) <= old_frac(1) or textured;
           end if;
         end if;
-        -- Without a parabola the operands mean nothing: the first lane need not choose.
-        if n = 0 or adjacent = '1' then
-          new_rise <= std_logic_vector(old_best - old_prev);
-          new_both <= std_logic_vector((old_best & '0') - resize(old_prev, G_MNCC_W + 1) - resize(v, G_MNCC_W + 1));
-        else
-          new_rise <= old_rise;
-          new_both <= old_both;
-        end if;
         new_parabola <= (way_parabola(n) or adjacent) and not better;
         if rst = '1' or cancel = '1' then
           new_valid <= '0';
@@ -403,8 +397,30 @@ begin
     way_prev((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W)              <= std_logic_vector(new_prev);
     way_plane((n + 2) * C_PLANE_W - 1 downto (n + 1) * C_PLANE_W)           <= new_plane;
     way_frac((n + 2) * G_FRAC_W - 1 downto (n + 1) * G_FRAC_W)              <= new_frac;
-    way_rise((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W)              <= new_rise;
-    way_both((n + 2) * (G_MNCC_W + 1) - 1 downto (n + 1) * (G_MNCC_W + 1))  <= new_both;
+
+    g_pass : if n < G_LANES - 1 generate
+
+      p_pass : process (clk)
+      begin
+        if rising_edge(clk) then
+          way_lower((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W) <= std_logic_vector(lower);
+          way_upper((n + 2) * G_MNCC_W - 1 downto (n + 1) * G_MNCC_W) <= std_logic_vector(upper);
+        end if;
+      end process p_pass;
+
+    end generate g_pass;
+
+    g_operands : if n = G_LANES - 1 generate
+
+      p_operands : process (clk)
+      begin
+        if rising_edge(clk) then
+          s3_rise <= old_best - lower;
+          s3_both <= (old_best & '0') - resize(lower, G_MNCC_W + 1) - resize(upper, G_MNCC_W + 1);
+        end if;
+      end process p_operands;
+
+    end generate g_operands;
 
   end generate g_lane;
 
@@ -413,7 +429,7 @@ begin
              & way_plane((G_LANES + 1) * C_PLANE_W - 1 downto G_LANES * C_PLANE_W)
              & way_frac((G_LANES + 1) * G_FRAC_W - 1 downto G_LANES * G_FRAC_W)
              & way_local_max(G_LANES) & way_prev_ok(G_LANES);
-  s3_num  <= "00" & way_rise((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W);
+  s3_num  <= "00" & std_logic_vector(s3_rise);
   s3_wait <= way_parabola(G_LANES) & s3_word;
 
   u_divider : entity work.divider
@@ -424,7 +440,7 @@ begin
     port map (
       clk    => clk,
       s_num  => s3_num,
-      s_den  => way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1)),
+      s_den  => std_logic_vector(s3_both),
       m_quot => quot
     );
 
@@ -529,8 +545,7 @@ begin
   -- synthesis translate_off
   -- Rules, in simulators.
   p_rules : process (clk)
-    variable v_way  : std_logic; -- a cell is on its way to the map
-    variable v_both : unsigned(G_MNCC_W downto 0);
+    variable v_way : std_logic; -- a cell is on its way to the map
   begin
     if rising_edge(clk) then
       v_way := s_valid(0) or s1_valid;
@@ -556,8 +571,7 @@ begin
         report "updating: more cells than the map has"
         severity failure;
       if way_in_valid(G_LANES) = '1' and way_parabola(G_LANES) = '1' then
-        v_both := unsigned(way_both((G_LANES + 1) * (G_MNCC_W + 1) - 1 downto G_LANES * (G_MNCC_W + 1)));
-        assert unsigned(s3_num) <= v_both and v_both /= 0
+        assert s3_rise <= s3_both and s3_both /= 0
           report "updating: the parabola's quotient is not in 0..1"
           severity failure;
       end if;
