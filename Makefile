@@ -79,7 +79,7 @@ sim-gates: setup ## The netlist for Virtex-6 at gate level, bit-exact with recor
 .PHONY: cost
 cost: setup ## LUT, FF, RAM, DSP of the engines beside the paper's, by Yosys (minutes)   CFG=tile FAMILY=xc6v,.. ALL=1
 	@scripts/setup.sh cost
-	@scripts/build.sh shape_table
+	@scripts/build.sh shape_table link_table
 	@scripts/cost/report.py $(if $(CFG),--config $(CFG)) $(if $(ALL),--all) $(if $(FAMILY),--family $(FAMILY))
 
 .PHONY: cost-check
@@ -90,8 +90,20 @@ cost-check: setup ## All counts again (ten minutes): are they those of docs/cost
 .PHONY: cost-update
 cost-update: setup ## All counts again into scripts/cost/baseline.json, docs/cost.md, docs/datasheet.md, the picture
 	@scripts/setup.sh cost
-	@scripts/build.sh shape_table
+	@scripts/build.sh shape_table link_table
 	@scripts/cost/report.py --update
+
+.PHONY: dse
+dse: setup ## Design space: resources, clocks, accuracy; goes on where it stopped: build/dse/index.html   GRID=file SLURM=1
+	@scripts/setup.sh cost dse
+	@scripts/build.sh psweep shape_table psweep_accuracy
+	@scripts/dse/dse.sh $(if $(GRID),--grid $(GRID)) $(if $(SLURM),--slurm)
+
+.PHONY: dse-check
+dse-check: setup ## The workflow of make dse: killed and resumed; one source changed, only its dependants run
+	@scripts/setup.sh cost dse
+	@scripts/build.sh psweep shape_table psweep_accuracy
+	@scripts/dse/test_workflow.sh
 
 .PHONY: pnr
 pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (half an hour)   CFG=tile SEEDS=1,2,3

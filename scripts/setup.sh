@@ -3,7 +3,7 @@
 # Installs the Debian packages of scripts/packages.txt that are missing, and nothing else.
 #
 #   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion,
-#                                                     net, wire, waves, plots, cost, flows, sta
+#                                                     net, wire, waves, plots, cost, flows, sta, dse
 #     --check  install nothing, name what is missing (exit code 1 if anything is)
 #     --list   print the package names
 #
@@ -24,16 +24,18 @@ for arg in "$@"; do
     --check) mode=check ;;
     --list) mode=list ;;
     -h | --help) usage; exit 0 ;;
-    build | lint | formal | gates | opinion | net | wire | waves | plots | cost | flows | sta) groups+=("$arg") ;;
+    build | lint | formal | gates | opinion | net | wire | waves | plots | cost | flows | sta | dse) groups+=("$arg") ;;
     *) die "unknown argument '$arg'; see scripts/setup.sh --help" ;;
   esac
 done
 [ ${#groups[@]} -gt 0 ] || groups=(build)
-# Group cost has Python packages besides, in a virtual environment.
+# Groups cost and dse have Python packages besides, in virtual environments.
 finish() {
-  case " ${groups[*]} " in
-    *" cost "*) if [ "$mode" = check ]; then exec scripts/cost/venv.sh --check; else exec scripts/cost/venv.sh; fi ;;
-  esac
+  local group check=()
+  [ "$mode" != check ] || check=(--check)
+  for group in cost dse; do
+    case " ${groups[*]} " in *" $group "*) "scripts/$group/venv.sh" "${check[@]}" || exit 1 ;; esac
+  done
   exit 0
 }
 [ "${SETUP:-yes}" != no ] || finish
