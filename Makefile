@@ -94,7 +94,7 @@ cost-update: setup ## All counts again into scripts/cost/baseline.json, docs/cos
 	@scripts/cost/report.py --update
 
 .PHONY: dse
-dse: setup ## Design space: resources, clocks, accuracy; goes on where it stopped: build/dse/index.html   GRID=file SLURM=1
+dse: setup ## Design space: resources, clocks, accuracy, resumable: build/dse/index.html   GRID=file SLURM=1
 	@scripts/setup.sh cost dse
 	@scripts/build.sh psweep shape_table psweep_accuracy
 	@scripts/dse/dse.sh $(if $(GRID),--grid $(GRID)) $(if $(SLURM),--slurm)

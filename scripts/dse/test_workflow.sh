@@ -33,7 +33,7 @@ run() {
     > "$work/log" 2>&1
 }
 jobs_of() { grep -cE "^(local)?rule $1:" "$work/log" || true; }
-products() { find "$work/out/shape" "$work/out/accuracy" "$work/out/cost" -type f 2> /dev/null | wc -l; }
+products() { find "$work/out/shape" "$work/out/accuracy" "$work/out/cost" -type f 2> /dev/null | wc -l || true; }
 
 # Killed as soon as something is finished, with all of its jobs.
 set -m
