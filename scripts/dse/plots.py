@@ -88,7 +88,8 @@ set yrange [1500:60000]
 set xrange [0:*]
 set label 'NG-MEDIUM: 34,272 LUT4, 56 RAMB48 (2.75 Mbit)' at graph 0.3, first 40000
 plot 34272 lc rgb '#999999' dt 2 notitle, """ + ", ".join(
-    f"$l{n} using 1:2:(sqrt($3)*0.9) with points pt 7 ps variable lc rgb '{COLOURS[k]}' title '{n} lane(s)', "
+    f"$l{n} using 1:2:(sqrt($3)*0.9) with points pt 7 ps variable lc rgb '{COLOURS[k]}' "
+    f"title '{n} lane{'' if n == '1' else 's'}', "
     f"$l{n} using 1:2:4 with labels offset 0,1.2 font ',9' notitle" for k, n in enumerate(points))
      + f", $paper using 1:2 with points pt 5 ps 1.5 lc rgb 'black' title 'the paper (100 RAMB36)'\n",
      {**{f"l{n}": rows for n, rows in points.items()}, "paper": [(PAPER_CLOCKS, PAPER_LUT)]})
