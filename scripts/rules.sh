@@ -85,7 +85,7 @@ try similarity 's/s15_den <= s14_den\(C_NORM downto 1\)/s15_den <= s14_den(C_NOR
 try similarity 's/raddr => s3_col/raddr => s7_col/' 'similarity: the sums of a column'
 try psweep 's/\+ updating_latency\(G_FRAC_W, G_LANES\);/;/' 'updating: unloading begins while'
 try updating "s/(s1_first <=) first;/\1 '0';/" 'updating: a cell of the map is unknown'
-try updating 's/old_best - old_prev\)/old_prev - old_best)/' "updating: the parabola's quotient"
+try updating 's/old_best - lower;/lower - old_best;/' "updating: the parabola's quotient"
 try control 's/state_q <= C_FLUSHING;/state_q <= "0001";/' 'control: a state that cannot be'
 wait
 told=$(find "$out" -name '*.told' | wc -l)
