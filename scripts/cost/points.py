@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The configurations of docs/cost.md, and the figures of others that they are compared with."""
+import pathlib
 
 # Each: what is measured (entity, unit of it, configuration or generics, no_dsp), in which families flat and with the
 # hierarchy kept; tile, pixels, planes of its frame (for clocks, by the planner). 'quick': part of 'make sim'.
@@ -35,8 +36,9 @@ POINTS = {
              "default": True, "flat": ("xc6v",)},
     "chip_v5qv": {"title": "chip: `tile`, four lanes, both buffers", "entity": "psweep_top", **TILE,
                   "generics": {"G_LANES": 4}, "flat": ("xc5v",)},
-    "chip_ng": {"title": "chip: 131 x 101 cells, buffer 234 x 114, two lanes, single buffers", "entity": "psweep_top",
-                "tile": (131, 101), "generics": {**NG_TILE, "G_ROW_SLOTS": 2, "G_MAP_DEPTH": 704},
+    # Rings of rows and map as large as the blocks that are left: G_ROW_SLOTS, G_MAP_DEPTH.
+    "chip_ng": {"title": "chip: 131 x 101 cells, buffer 234 x 114, two lanes, rings", "entity": "psweep_top",
+                "tile": (131, 101), "link_mhz": 60, "generics": {**NG_TILE, "G_ROW_SLOTS": 11, "G_MAP_DEPTH": 5984},
                 "flat": ("ng_medium",)},
     "similarity": {"title": "unit similarity of bands", "unit": "similarity", **BANDS, "tile": None,
                    "flat": ("xc6v", "ng_medium"), "quick": ("ng_medium",)},
@@ -48,11 +50,22 @@ POINTS = {
 # One generic of `tile` at a time.
 BITS = {"G_INTERP_F": (0, 1, 2, 3, 4), "G_MNCC_W": (10, 12, 13, 14, 16), "G_FRAC_W": (6, 8, 10)}
 SHIPPED = {"G_INTERP_F": 2, "G_MNCC_W": 13, "G_FRAC_W": 8}
-for _generic, _values in BITS.items():
+# Other generics of `tile`, for docs/psweep.md: value there, values tried.
+SIZES = {"G_IMG_COLS": (362, (724,)), "G_IMG_ROWS": (144, (288,)), "G_PLANE_COLS": (256, (512,)),
+         "G_PLANE_ROWS": (130, (260,)), "G_PLANES": (301, (602,)), "G_WINDOW": (13, (7, 21)), "G_PIX_W": (8, (10,)),
+         "G_WEIGHT_W": (8, (10,))}
+for _generic, _values in {**BITS, **{g: values for g, (_, values) in SIZES.items()}}.items():
     for _value in _values:
-        if _value != SHIPPED[_generic]:
+        if _value != SHIPPED.get(_generic):
             POINTS[f"{_generic}_{_value}"] = {"title": f"`tile`, {_generic} = {_value}", **TILE,
                                               "generics": {_generic: _value}, "flat": ("xc6v",)}
+
+# Each entity with its generics as by default: the line 'cost' of its page.
+for _line in (pathlib.Path(__file__).resolve().parents[2] / "rtl" / "files.f").read_text().splitlines():
+    _entity = _line.split("#")[0].strip().removesuffix(".vhd")
+    if _entity and not _entity.endswith("_pkg"):
+        POINTS[f"entity_{_entity}"] = {"title": f"entity {_entity}, generics as by default", "entity": _entity,
+                                       "tile": None, "flat": ("xc6v",)}
 
 # The paper's table 4 (Virtex-6 xc6vlx240t, ISE 14.7): LUT, FF, RAMB36, DSP.
 PAPER_UNITS = {"control": (115, 51, 0, 0), "address_generator": (498, 427, 1, 0), "storage": (783, 812, 28, 0),

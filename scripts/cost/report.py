@@ -13,7 +13,7 @@
   scripts/cost/report.py --pnr               place and route into baseline.json and the pages (half an hour)
 
 Everything is written to build/cost/ as JSON (fields: docs/cost.md), with the plot cost.svg. JOBS: measurements at once.
-SHAPE_TABLE: another program than build/shape_table.
+COST_PROGRAMS: folder of shape_table and link_table (default build).
 """
 import argparse
 import json
@@ -22,7 +22,6 @@ import pathlib
 import re
 import subprocess
 import sys
-import textwrap
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -33,11 +32,11 @@ import families  # noqa: E402
 import measure as cost  # noqa: E402
 import pnr  # noqa: E402
 from points import (BITS, NG_MEDIUM, PAPER_ALL, PAPER_CLOCKS, PAPER_UNITS, PEERS, POINTS, SHIPPED,  # noqa: E402
-                    V5QV)
+                    SIZES, V5QV)
 
 OUT = cost.ROOT / "build" / "cost"
 BASELINE = cost.HERE / "baseline.json"
-PAGES = (cost.ROOT / "docs" / "cost.md", cost.ROOT / "docs" / "datasheet.md")
+PAGES = [cost.ROOT / "README.md", *sorted((cost.ROOT / "docs").glob("*.md"))]
 PICTURE = cost.ROOT / "docs" / "images" / "cost.svg"
 FAMILY_NAMES = {"xc6v": "Virtex-6", "xc5v": "Virtex-5", "ecp5": "ECP5", "ng_medium": "NG-MEDIUM"}
 # The same RTL gives the same counts with the same tools; another GHDL writes other Verilog for the same circuit, and
@@ -89,24 +88,34 @@ def short(result):
     return out
 
 
+def run_program(name, *arguments):
+    """What a program of the build prints."""
+    program = pathlib.Path(os.environ.get("COST_PROGRAMS", cost.ROOT / "build")) / name
+    if not program.is_file():
+        raise cost.CostError(f"no {program}: run scripts/build.sh {name} (make cost does)")
+    run_ = subprocess.run([str(program), *map(str, arguments)], capture_output=True, text=True)
+    if run_.returncode:
+        raise cost.CostError(f"{name}: {run_.stderr}")
+    return run_.stdout
+
+
 def clocks_of(name):
     """Clocks of the frame of a point, by the planner: shape_table of the build."""
     point = POINTS[name]
     if not point.get("tile"):
         return None
-    program = pathlib.Path(os.environ.get("SHAPE_TABLE", cost.ROOT / "build" / "shape_table"))
-    if not program.is_file():
-        raise cost.CostError("no build/shape_table: run scripts/build.sh shape_table (make cost does)")
-    numbers = [str(n) for n in point["tile"]]
+    numbers = point["tile"]
     if "pixels" in point:
-        numbers += [str(point["pixels"]), str(point["planes"])]
-    run_ = subprocess.run([str(program), "--tile", *numbers], capture_output=True, text=True)
-    if run_.returncode:
-        raise cost.CostError(run_.stderr)
-    plan = json.loads(run_.stdout)
+        numbers += (point["pixels"], point["planes"])
+    plan = json.loads(run_program("shape_table", "--tile", *numbers))
     lanes = point.get("generics", {}).get("G_LANES", 1)
-    return {"clocks": plan["clocks"][str(lanes)], "useful": plan["useful"], "pixels": plan["pixels"],
-            "planes": plan["planes"], "tiles": plan["tiles"], "lanes": lanes}
+    frame = {"clocks": plan["clocks"][str(lanes)], "useful": plan["useful"], "pixels": plan["pixels"],
+             "planes": plan["planes"], "tiles": plan["tiles"], "lanes": lanes}
+    if "link_mhz" in point:
+        numbers = [point["generics"][g] for g in ("G_IMG_COLS", "G_IMG_ROWS", "G_PLANE_COLS", "G_PLANE_ROWS", "G_LANES",
+                                                  "G_ROW_SLOTS", "G_MAP_DEPTH")] + [point["link_mhz"]]
+        frame["link"] = json.loads(run_program("link_table", "--chip", *numbers))
+    return frame
 
 
 # ---- tables ---------------------------------------------------------------------------------------------------------
@@ -243,6 +252,38 @@ def table_bits(base):
     return markdown(["`tile`, xc6v", "bits", "LUT", "FF", "RAMB36", "DSP", "LUT more", "FF more"], rows)
 
 
+def table_headline(base):
+    """README.md: the engines beside the paper's."""
+    rows = []
+    for name, title in (("bands", "44-30-13-13, one plane at once"), ("tile", "256 x 130 tiles, one"),
+                        ("tile_2", "256 x 130 tiles, two"), ("tile_4", "256 x 130 tiles, four")):
+        c, frame = flat(base, name)["counts"], base["frames"][name]
+        rows.append([title, f"{c['lut']:,}", f"{c['ff']:,}", num(c["ram36_equivalent"]), c["dsp"],
+                     mega(frame["clocks"]), f"{efficiency(frame, c['lut']):.2f}"])
+        if name == "bands":
+            lut, ff, ram, dsp = PAPER_ALL
+            rows.append(["the paper's, 44-30-13-13 (ISE 14.7)", f"{lut:,}", f"{ff:,}", ram, dsp,
+                         f"{PAPER_CLOCKS / 1e6:.0f}",
+                         f"{frame['useful'] / PAPER_CLOCKS / (lut / 1000):.2f}"])
+    return markdown(
+        ["engine, Virtex-6", "LUT", "FF", "RAMB36", "DSP", "M clocks", "evaluations a clock and kLUT"], rows)
+
+
+def table_changes(base):
+    """docs/psweep.md: one generic of `tile` changed."""
+    start, rows = flat(base, "tile")["counts"], []
+    changes = [(g, old, new, f"{g}_{new}") for g, (old, values) in SIZES.items() for new in values]
+    changes += [(g, SHIPPED[g], new, f"{g}_{new}") for g, values in BITS.items() for new in values
+                if new == max(values)]
+    changes += [("G_LANES", 1, 2, "tile_2"), ("G_LANES", 1, 4, "tile_4"), ("G_RECTIFIED", 0, 1, "tile_rectified")]
+    for generic, old, new, name in changes:
+        c = flat(base, name)["counts"]
+        rows.append([generic, old, new, *(f"{c[k] - start[k]:+g}" for k in ("lut", "ff", "ram36_equivalent", "dsp"))])
+    head = markdown(["changed", "from", "to", "LUT", "FF", "RAMB36", "DSP"], rows)
+    return (f"`tile`: {start['lut']} LUT, {start['ff']} FF, {num(start['ram36_equivalent'])} RAMB36, {start['dsp']} "
+            f"DSP48E1.\n\n{head}")
+
+
 def table_nx_rams(base):
     rows, groups = [], {}
     for m in flat(base, "chip_ng", "ng_medium")["memories"]:
@@ -281,12 +322,12 @@ def table_targets(base):
             f"{value:.3f} with {c['lut']:,} LUT, {c['dsp']} DSP", value >= target)
     found = flat(base, "chip_ng", "ng_medium")
     c, blocks = found["counts"], nx_rows(found["memories"])[0]
-    sweep = base["frames"]["chip_ng"]["clocks"]
-    row("one NG-MEDIUM: chip, two lanes (waiting for the link: `make link-table`)",
-        "56 RAMB48 by modes, 26K LUT, 26K FF, 112 DSP, 220 M clocks",
+    sweep, link = base["frames"]["chip_ng"]["clocks"], base["frames"]["chip_ng"]["link"]
+    row("one NG-MEDIUM: chip, two lanes",
+        "56 RAMB48 by modes, 26K LUT, 26K FF, 112 DSP, 220 M clocks, 0.6 s waiting for the link",
         f"{blocks} RAMB48 by modes ({c['ram48']} by Yosys), {c['lut']:,} LUT, {c['ff']:,} FF, {c['dsp']} DSP, "
-        f"{mega(sweep)} M clocks", blocks <= 56 and c["lut"] <= 26000 and c["ff"] <= 26000 and c["dsp"] <= 112
-        and sweep <= 220e6)
+        f"{mega(sweep)} M clocks, {link['wait']:.2f} s at {link['mhz']} MHz", blocks <= 56 and c["lut"] <= 26000
+        and c["ff"] <= 26000 and c["dsp"] <= 112 and sweep <= 220e6 and link["wait"] <= 0.6)
     c, frame = flat(base, "chip_v5qv", "xc5v")["counts"], base["frames"]["chip_v5qv"]
     shares = [c["lut"] / V5QV["lut"], c["ram36_equivalent"] / V5QV["ram"], c["dsp"] / V5QV["dsp"]]
     row("one Virtex-5QV: chip, four lanes, both buffers", "60 % of LUT, RAM, DSP; 115 M clocks",
@@ -310,12 +351,26 @@ def table_pnr(base):
 
 TABLES = {"engines": table_engines, "units": table_units, "cells": table_cells, "families": table_families,
           "levels": table_levels, "five": table_five, "bits": table_bits, "nx": table_nx_rams,
-          "targets": table_targets, "pnr": table_pnr}
+          "targets": table_targets, "pnr": table_pnr, "changes": table_changes,
+          "headline": table_headline}
+
+
+def cost_line(base, entity):
+    """Of the page of an entity."""
+    found = flat(base, f"entity_{entity}")
+    if found is None:
+        raise cost.CostError(f"{entity} is not in baseline.json: scripts/cost/report.py --update")
+    c = found["counts"]
+    parts = [f"{c['lut']} LUT", f"{c['ff']} FF"]
+    parts += [f"{num(c['ram36_equivalent'])} RAMB36"] if c["ram36_equivalent"] else []
+    parts += [f"{c['dsp']} DSP48E1"] if c["dsp"] else []
+    return f"| cost | {', '.join(parts)} (Yosys, xc6v, generics as by default)"
 
 
 def pages(base, check):
-    """Puts the tables between their markers; with check only compares. Number of tables found."""
-    number, wrong = 0, []
+    """Puts tables between their markers, costs into the pages of the entities; with check only compares. Number of
+    tables found."""
+    number, lines, wrong = 0, 0, []
     for page in PAGES:
         text = page.read_text()
 
@@ -325,13 +380,22 @@ def pages(base, check):
             if match[1] not in TABLES:
                 raise cost.CostError(f"{page.name}: no table '{match[1]}'")
             return f"<!-- cost: {match[1]} -->\n{TABLES[match[1]](base)}\n<!-- /cost -->"
+
+        def line(match):
+            nonlocal lines
+            lines += 1
+            return cost_line(base, page.stem) + match[1]
         new = re.sub(r"<!-- cost: (\w+) -->\n.*?<!-- /cost -->", fill, text, flags=re.S)
+        new = re.sub(r"^\| cost \| .*?\(Yosys, xc6v, generics as by default\)(.*\|)$", line, new, flags=re.M)
         if new != text:
             wrong.append(page.name)
             if not check:
                 page.write_text(new)
     if number < len(TABLES):
         raise cost.CostError(f"only {number} tables in the pages, there should be {len(TABLES)}")
+    missing = [name for name in base["points"] if name.startswith("entity_")]
+    if lines < len(missing):
+        raise cost.CostError(f"only {lines} of {len(missing)} pages of entities have a line 'cost'")
     if check and wrong:
         raise cost.CostError(f"tables of {', '.join(wrong)} are not those of baseline.json: "
                              "scripts/cost/report.py --pages writes them")
@@ -396,10 +460,21 @@ def collect(results, base):
         base["points"].setdefault(name, {}).setdefault(family, {})["units" if hierarchy else "flat"] = short(result)
 
 
+def pack(items, width=100):
+    """Items joined to lines of about this width; an item is never broken."""
+    lines = [""]
+    for item in items:
+        if lines[-1] and len(lines[-1]) + len(item) > width:
+            lines.append("")
+        lines[-1] += (" " if lines[-1] else "") + item
+    return "\n".join(lines)
+
+
 def write_baseline(base):
     text = json.dumps(base, indent=0, sort_keys=True)
     # Innermost objects on few lines: a change is a line.
-    text = re.sub(r"\{\n([^{}\[\]]*?)\n\}", lambda m: "{" + textwrap.fill(m[1].replace("\n", " "), 100) + "}", text)
+    text = re.sub(r"\{\n([^{}\[\]]*?)\n\}", lambda m: "{" + pack(m[1].split("\n")) + "}", text)
+    assert json.loads(text) == json.loads(json.dumps(base))
     BASELINE.write_text(text + "\n")
 
 
@@ -456,7 +531,7 @@ def update(rtl):
     new = {"schema": cost.SCHEMA, "tool": cost.tool_version(), "ghdl": ghdl_version(), "points": {},
            "frames": {}, "pnr": base.get("pnr", {})}
     collect(run(list(all_questions()), rtl), new)
-    frames = {name: clocks_of(name) for name in POINTS if not name.startswith("G_")}
+    frames = {name: clocks_of(name) for name in POINTS if not name.startswith(("G_", "entity_"))}
     new["frames"] = {name: frame for name, frame in frames.items() if frame}
     write_baseline(new)
     plot(new["points"]["bands"]["xc6v"]["units"], flat(new, "bands"), PICTURE)

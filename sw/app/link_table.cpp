@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // link_table: what the arbiter's buffers cost and what they buy, for the paper's pair (1120 x 1120 pixels, 301 planes,
 // window 13) in the paper's bands and in tiles, as the Markdown tables of docs/arbiter.md (make link-table). All of it
-// is forecast (plan/link_plan.hpp), nothing measured. Usage: link_table, no arguments.
+// is forecast (plan/link_plan.hpp), nothing measured.
+//   link_table             the tables
+//   link_table --chip IMG_COLS IMG_ROWS PLANE_COLS PLANE_ROWS LANES ROW_SLOTS MAP_DEPTH MHZ
+//                          one chip as JSON, full duplex, two tiles in flight: seconds that its engine waits for the
+//                          link, and all of the pair; sizes like the generics (scripts/cost/report.py)
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -111,6 +115,18 @@ void by_lanes(const std::vector<Geometry>& all) {
     }
 }
 
+void one_chip(const std::vector<int>& n) {
+  Geometry g = geometry("", n[0], n[1], n[2], n[3]);
+  g.chip.row_slots = n[5];
+  g.chip.map_depth = n[6];
+  LinkPlanOptions o;
+  o.lanes = n[4];
+  o.clk_mhz = n[7];
+  const LinkForecast f = forecast_link(g.chip, g.tiles, o);
+  std::printf("{\"mhz\": %d, \"wait\": %.3f, \"seconds\": %.3f}\n", n[7],
+              static_cast<double>(f.stall()) / (1e6 * o.clk_mhz), f.end);
+}
+
 void run() {
   const std::vector<Geometry> all = {geometry("bands", 1120, 44, 1092, 30), geometry("tiles", 362, 144, 256, 130)};
   for (const bool half_duplex : {false, true}) by_buffering(all, half_duplex);
@@ -121,9 +137,21 @@ void run() {
 }  // namespace
 }  // namespace psweep
 
-int main() {
+int main(int argc, char** argv) {
+  const bool chip = argc == 10 && std::string(argv[1]) == "--chip";
+  if (argc > 1 && !chip) {
+    std::fprintf(stderr,
+                 "usage: link_table [--chip IMG_COLS IMG_ROWS PLANE_COLS PLANE_ROWS LANES ROW_SLOTS MAP_DEPTH MHZ]\n");
+    return 2;
+  }
   try {
-    psweep::run();
+    if (chip) {
+      std::vector<int> numbers;
+      for (int i = 2; i < argc; ++i) numbers.push_back(std::stoi(argv[i]));
+      psweep::one_chip(numbers);
+    } else {
+      psweep::run();
+    }
   } catch (const std::exception& e) {
     std::fprintf(stderr, "link_table: %s\n", e.what());
     return 1;
