@@ -38,7 +38,7 @@ my %of_ctest = (record_engine => ['record_engine', 'psweep_replay'],
                 record_chip   => ['record_chip', 'psweep_top_replay'],
                 elaboration   => []);
 my %first  = (
-  psweep_pkg => ['test_address_generator', 'test_ram_sdp', 'test_storage', 'test_updating'],
+  psweep_pkg => ['test_address_generator', 'test_ram_deep', 'test_ram_2r', 'test_storage', 'test_updating'],
   eth_pkg    => ['test_mac_rx', 'test_mac_tx', 'test_packet_rx'],
 );
 my %folder = (test_errors => 'engine', test_engine => 'engine', test_rtl_engine => 'engine', test_fuzz => 'chip',
