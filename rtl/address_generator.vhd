@@ -308,8 +308,6 @@ begin
   end process p_start;
 
   -- y parts ----------------------------------------------------------------------------------------------------------
-  y_lo         <= left_y_lo when row(3) = '1' else right_y_lo;
-  y_hi         <= left_y_hi when row(3) = '1' else right_y_hi;
   y_inside_now <= at_least(y_newer, y_lo) and at_most(y_newer, y_hi);
   y_loaded_now <= is_loaded(y_newer, win_last_row) and to_bit(G_RECTIFIED = 0 or unsigned(fraction_of(y_newer)) = 0);
   -- Higher bits are 0 where the sample is loaded.
@@ -321,6 +319,14 @@ begin
   p_row : process (clk)
   begin
     if rising_edge(clk) then
+      -- Bounds of the image that y_newer will be of, chosen ahead so that the comparison comes first in its clock.
+      if row(2) = '1' then
+        y_lo <= left_y_lo;
+        y_hi <= left_y_hi;
+      else
+        y_lo <= right_y_lo;
+        y_hi <= right_y_hi;
+      end if;
       -- A DSP block with its registers.
       product <= resize(y_half * to_unsigned(C_PITCH, clog2(C_PITCH + 1)), C_BANK_W);
       row_now <= product;

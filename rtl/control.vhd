@@ -8,6 +8,7 @@
 --              max(sweep_cols, C_ROW_MIN) clocks; the first sample in the clock after the last pixel; no bubble between
 --              rows or sets
 --   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
+--   Writes   : take effect two clocks after they are on s_cfg
 --   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
 --              work the address of a write is not looked at. A last map beat beats an abort in the same clock
 --   Upsets   : the state has a parity bit: no upset of one bit makes another state of it. A code without a name and a
@@ -45,7 +46,8 @@ entity control is
     s_pix_tready : out std_logic;
     s_pix_tlast  : in  std_logic;
 
-    -- Writes to address_generator's memories; the data are s_cfg_tdata(31 downto 0).
+    -- Writes to address_generator's memories.
+    cfg_data    : out std_logic_vector(31 downto 0);
     table_we    : out std_logic;
     table_addr  : out std_logic_vector(clog2(G_PLANES) + 2 downto 0);
     offset_we   : out std_logic;
@@ -146,10 +148,16 @@ architecture rtl of control is
   signal is_unload  : std_logic;
   signal is_drain   : std_logic;
 
-  -- Decoded write.
-  signal cfg_value    : unsigned(31 downto 0);
-  signal cfg_less_1   : unsigned(11 downto 0); -- of the low 12 bits
+  -- Decoded write, a clock after s_cfg.
+  signal cfg_word     : std_logic_vector(47 downto 0);
   signal cfg_command  : std_logic;             -- any write to COMMAND
+  signal cfg_low      : std_logic;             -- to 0x0001 .. 0x001F
+  signal cfg_middle   : std_logic;             -- to 0x0020 .. 0x7FFF, where nothing is
+  signal cfg_high     : std_logic;             -- to 0x8000 and up
+  signal cfg_in_table : std_logic;             -- the low bits are an address of the table
+  signal cfg_fits     : std_logic;             -- the value has no more than 17 bits, of which
+  signal cfg_value    : unsigned(16 downto 0); -- a limit of 2 ** 16 needs the last one
+  signal cfg_less_1   : unsigned(11 downto 0); -- of the low 12 bits
   signal cfg_register : std_logic;             -- any write to 0x0001 .. 0x001F, while idle
   signal cfg_index    : unsigned(4 downto 0);
   signal cfg_table    : std_logic;             -- any write to 0x8000 and up, while idle
@@ -183,9 +191,12 @@ architecture rtl of control is
   signal plane_set   : unsigned(C_SET_W - 1 downto 0);
   signal last_wide   : unsigned(C_SET_W + C_PLANE_W + 1 downto 0); -- last_plane, wide enough for any slice
   signal last_set    : unsigned(C_SET_W - 1 downto 0);
-  signal at_set_end  : std_logic; -- in the last set
-  signal last_col    : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
-  signal last_row    : unsigned(C_ROW_W - 1 downto 0);
+  signal at_set_end   : std_logic; -- in the last set
+  signal at_set_end_q : std_logic;
+  signal last_col_less_1 : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
+  signal last_row_less_1 : unsigned(C_ROW_W - 1 downto 0);
+  signal one_col     : std_logic; -- rows of one pixel
+  signal one_row     : std_logic; -- a single row
   signal at_col_end  : std_logic;
   signal at_row_end  : std_logic;
   signal at_last     : std_logic; -- last pixel of the window, or last clock of the plane
@@ -223,7 +234,8 @@ architecture rtl of control is
   signal cfg_event     : std_logic;
   signal tile_event    : std_logic;
   signal new_events    : unsigned(1 downto 0);
-  signal samples_lost  : unsigned(2 downto 0); -- in this clock, over all lanes
+  signal window_lost   : std_logic_vector(G_LANES - 1 downto 0);
+  signal samples_lost  : unsigned(2 downto 0); -- over all lanes
   signal sample_lost   : std_logic;
 
   signal error_bits          : std_logic_vector(7 downto 0);
@@ -282,33 +294,53 @@ begin
   is_drain  <= to_bit(state_q = C_DRAIN);
 
   -- Register writes --------------------------------------------------------------------------------------------------
-  s_cfg_tready  <= '1';
-  cfg_value     <= unsigned(s_cfg_tdata(31 downto 0));
-  cfg_less_1    <= unsigned(s_cfg_tdata(11 downto 0)) - 1;
-  cfg_index     <= unsigned(s_cfg_tdata(36 downto 32));
-  cfg_command   <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
-  cfg_register  <= s_cfg_tvalid and is_idle and to_bit(unsigned(s_cfg_tdata(47 downto 37)) = 0)
-                   and to_bit(cfg_index /= C_COMMAND);
-  cfg_table     <= s_cfg_tvalid and is_idle and s_cfg_tdata(47);
-  command_clear <= cfg_command and s_cfg_tdata(2);
-  command_abort <= cfg_command and s_cfg_tdata(1);
-  command_start <= cfg_command and s_cfg_tdata(0) and not s_cfg_tdata(1);
+  -- In a register first, with what the address alone tells: checks and state come behind it.
+  s_cfg_tready <= '1';
 
-  table_next  <= to_bit(resize(unsigned(s_cfg_tdata(46 downto 32)), C_TABLE_W + 1) = table_words);
-  table_ok    <= to_bit(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS)
-                 and to_bit(resize(unsigned(s_cfg_tdata(46 downto 32)), C_TABLE_W + 1) <= table_words);
+  p_cfg : process (clk)
+  begin
+    if rising_edge(clk) then
+      cfg_word     <= s_cfg_tdata;
+      cfg_command  <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
+      cfg_low      <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 37)) = 0)
+                      and to_bit(unsigned(s_cfg_tdata(36 downto 32)) /= C_COMMAND);
+      cfg_middle   <= s_cfg_tvalid and not s_cfg_tdata(47) and to_bit(unsigned(s_cfg_tdata(46 downto 37)) /= 0);
+      cfg_high     <= s_cfg_tvalid and s_cfg_tdata(47);
+      cfg_in_table <= to_bit(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS);
+      cfg_fits     <= to_bit(unsigned(s_cfg_tdata(31 downto 17)) = 0);
+      if rst = '1' then
+        cfg_command <= '0';
+        cfg_low     <= '0';
+        cfg_middle  <= '0';
+        cfg_high    <= '0';
+      end if;
+    end if;
+  end process p_cfg;
+
+  cfg_value     <= unsigned(cfg_word(16 downto 0));
+  cfg_less_1    <= unsigned(cfg_word(11 downto 0)) - 1;
+  cfg_index     <= unsigned(cfg_word(36 downto 32));
+  cfg_register  <= cfg_low and is_idle;
+  cfg_table     <= cfg_high and is_idle;
+  command_clear <= cfg_command and cfg_word(2);
+  command_abort <= cfg_command and cfg_word(1);
+  command_start <= cfg_command and cfg_word(0) and not cfg_word(1);
+
+  table_next  <= to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) = table_words);
+  table_ok    <= cfg_in_table
+                 and to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) <= table_words);
   table_we    <= cfg_table and table_ok;
-  table_addr  <= s_cfg_tdata(C_TABLE_W + 31 downto 32);
+  cfg_data    <= cfg_word(31 downto 0);
+  table_addr  <= cfg_word(C_TABLE_W + 31 downto 32);
   offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
-  offset_addr <= s_cfg_tdata(33 downto 32);
+  offset_addr <= cfg_word(33 downto 32);
 
-  event_busy    <= (s_cfg_tvalid and not cfg_command and not is_idle) or (command_start and not is_idle);
+  event_busy    <= not is_idle and (cfg_low or cfg_middle or cfg_high or command_start);
   event_address <= (cfg_table and not table_ok)
                    or (cfg_register and to_bit(cfg_index = 7))
                    or (cfg_register and to_bit(cfg_index >= 12 and cfg_index < C_LEFT))
                    or (cfg_register and to_bit(cfg_index >= C_RIGHT + 4))
-                   or (s_cfg_tvalid and is_idle and not s_cfg_tdata(47)
-                       and to_bit(unsigned(s_cfg_tdata(46 downto 37)) /= 0));
+                   or (cfg_middle and is_idle);
 
   config_bad   <= not (tile_cols_ok and tile_rows_ok and win_cols_ok and win_rows_ok and planes_ok and threshold_ok);
   table_bad    <= to_bit(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
@@ -322,54 +354,54 @@ begin
     if rising_edge(clk) then
       if cfg_register = '1' then
         if cfg_index = C_TILE_COLS then
-          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_COLS);
+          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_COLS);
           tile_cols_ok <= v_ok;
           if v_ok = '1' then
             tile_last_col <= cfg_less_1(tile_last_col'range);
           end if;
         elsif cfg_index = C_TILE_ROWS then
-          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_ROWS);
+          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_ROWS);
           tile_rows_ok <= v_ok;
           if v_ok = '1' then
             tile_last_row <= cfg_less_1(tile_last_row'range);
           end if;
         elsif cfg_index = C_WIN_COLS then
-          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_IMG_COLS);
+          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_IMG_COLS);
           win_cols_ok <= v_ok;
           if v_ok = '1' then
             win_last_col_q <= cfg_less_1(win_last_col_q'range);
           end if;
         elsif cfg_index = C_WIN_ROWS then
-          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_IMG_ROWS);
+          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_IMG_ROWS);
           win_rows_ok <= v_ok;
           if v_ok = '1' then
             win_last_row_q <= cfg_less_1(win_last_row_q'range);
           end if;
         elsif cfg_index = C_PLANES then
-          v_ok := to_bit(cfg_value >= 1 and cfg_value <= G_PLANES);
+          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_PLANES);
           planes_ok <= v_ok;
           if v_ok = '1' then
             last_plane <= cfg_less_1(last_plane'range);
           end if;
         elsif cfg_index = C_THRESHOLD then
-          threshold_ok <= to_bit(cfg_value < 2 ** G_MNCC_W);
-          threshold    <= s_cfg_tdata(G_MNCC_W - 1 downto 0);
+          threshold_ok <= cfg_fits and to_bit(cfg_value < 2 ** G_MNCC_W);
+          threshold    <= cfg_word(G_MNCC_W - 1 downto 0);
         elsif cfg_index = C_LEFT then
-          left_x_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          left_x_lo <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_LEFT + 1 then
-          left_x_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          left_x_hi <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_LEFT + 2 then
-          left_y_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          left_y_lo <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_LEFT + 3 then
-          left_y_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          left_y_hi <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_RIGHT then
-          right_x_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          right_x_lo <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_RIGHT + 1 then
-          right_x_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          right_x_hi <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_RIGHT + 2 then
-          right_y_lo <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          right_y_lo <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_RIGHT + 3 then
-          right_y_hi <= s_cfg_tdata(C_INT_W - 1 downto 0);
+          right_y_hi <= cfg_word(C_INT_W - 1 downto 0);
         end if;
       end if;
       if cfg_table = '1' and table_ok = '1' and table_next = '1' then
@@ -412,16 +444,12 @@ begin
   pix_ready <= is_load or is_drain;
   pix_fire  <= s_pix_tvalid and is_load;
 
-  last_col    <= resize(win_last_col_q, C_COL_W) when is_load = '1' else row_last_col;
-  last_row    <= resize(win_last_row_q, C_ROW_W) when is_load = '1' else sweep_last_row;
-  at_col_end  <= to_bit(col = last_col);
-  at_row_end  <= to_bit(row = last_row);
   at_last     <= at_col_end and at_row_end;
   last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
   last_set    <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
   -- 'Not below' and the second comparison are for an upset bit: no tile sweeps more sets than the table has.
   at_set_end  <= to_bit(plane_set >= last_set or plane_set = C_SETS - 1);
-  at_tile_end <= is_sweep and at_last and at_set_end;
+  at_tile_end <= is_sweep and at_last and at_set_end_q;
   step        <= pix_fire or is_sweep;
   load_done   <= pix_fire and at_last and s_pix_tlast;
   event_short <= pix_fire and s_pix_tlast and not at_last;
@@ -432,7 +460,7 @@ begin
   -- What cannot be unless a bit was upset: a state without a name, or a map that ends before or after its last beat.
   event_upset <= not (is_idle or is_load or is_sweep or is_flush or is_unload or is_drain)
                  or (is_unload and not map_more and not map_valid)
-                 or (map_last and map_more);
+                 or (map_last and map_more and not abort_q); -- (a beat that an abort takes away is none)
   -- A drained tile was counted when it was refused.
   tile_drop   <= event_config or event_table or event_short or event_long or event_upset
                  or (command_abort and not is_idle and not is_drain and not tile_done and not event_short
@@ -479,19 +507,41 @@ begin
         state_q <= C_IDLE;
       end if;
 
-      -- Counters come back to 0 by themselves at the end of load and of every plane.
+      -- Counters come back to 0 by themselves at the end of load and of every plane. Whether they are at their ends is
+      -- known with them, from registers, since all states and checks hang on it.
       if step = '1' then
         if at_col_end = '1' then
-          col <= (others => '0');
+          col        <= (others => '0');
+          at_col_end <= one_col;
           if at_row_end = '1' then
-            row <= (others => '0');
+            row        <= (others => '0');
+            at_row_end <= one_row;
           else
-            row <= row + 1;
+            row        <= row + 1;
+            at_row_end <= to_bit(row = last_row_less_1);
           end if;
         else
-          col <= col + 1;
+          col        <= col + 1;
+          at_col_end <= to_bit(col = last_col_less_1);
         end if;
       end if;
+      -- Limits of load are set up in idle, those of the sweep, which has at least three rows, when load is over.
+      if is_idle = '1' then
+        last_col_less_1 <= resize(win_last_col_q, C_COL_W) - 1;
+        last_row_less_1 <= resize(win_last_row_q, C_ROW_W) - 1;
+        one_col    <= to_bit(win_last_col_q = 0);
+        one_row    <= to_bit(win_last_row_q = 0);
+        at_col_end <= to_bit(win_last_col_q = 0);
+        at_row_end <= to_bit(win_last_row_q = 0);
+      elsif load_done = '1' then
+        last_col_less_1 <= row_last_col - 1;
+        last_row_less_1 <= sweep_last_row - 1;
+        one_col    <= '0';
+        one_row    <= '0';
+        at_col_end <= '0';
+        at_row_end <= '0';
+      end if;
+      at_set_end_q <= at_set_end; -- a set takes many clocks
       if is_sweep = '1' and at_last = '1' then
         plane_set <= plane_set + 1;
       end if;
@@ -554,13 +604,26 @@ begin
   map_abort     <= abort_q;
 
   -- Status -----------------------------------------------------------------------------------------------------------
-  -- In the clock after an abort the address generator still shows a sample of the tile.
-  p_lost : process (window_error, abort_q)
+  -- Counted a clock later: the address generator's tests lie before them. In the clock after an abort it still shows a
+  -- sample of the tile.
+  p_window : process (clk)
+  begin
+    if rising_edge(clk) then
+      for n in 0 to G_LANES - 1 loop
+        window_lost(n) <= window_error(n) and not abort_q;
+      end loop;
+      if rst = '1' then
+        window_lost <= (others => '0');
+      end if;
+    end if;
+  end process p_window;
+
+  p_lost : process (window_lost)
     variable v_count : unsigned(2 downto 0);
   begin
     v_count := (others => '0');
     for n in 0 to G_LANES - 1 loop
-      if window_error(n) = '1' and abort_q = '0' then
+      if window_lost(n) = '1' then
         v_count := v_count + 1;
       end if;
     end loop;
@@ -585,7 +648,7 @@ begin
       error_bits(C_ERROR_ADDRESS) <= error_bits(C_ERROR_ADDRESS) or event_address;
       error_bits(C_ERROR_BUSY)    <= error_bits(C_ERROR_BUSY) or event_busy;
       error_bits(C_ERROR_UPSET)   <= error_bits(C_ERROR_UPSET) or event_upset;
-      -- Counted a clock later: the way from s_cfg through the table's checks is long enough.
+      -- Counted a clock later: the way through the table's checks is long enough.
       new_events <= (cfg_event and tile_event) & (cfg_event xor tile_event);
       if error_count_next(16) = '0' then
         error_count_q <= error_count_next(15 downto 0);
@@ -632,7 +695,7 @@ begin
         window_seen                  <= event_window;
       end if;
       if start_ok = '1' then
-        tile_clocks_q <= to_unsigned(1, 32);
+        tile_clocks_q <= to_unsigned(2, 32); -- it was on s_cfg a clock ago
       elsif is_idle = '0' and is_drain = '0' and tile_done = '0' then
         tile_clocks_q <= tile_clocks_q + 1;
       end if;
@@ -683,7 +746,8 @@ begin
           report "control: a sample beyond the tile"
           severity failure;
       end if;
-      v_abort := command_abort = '1' or (v_abort and (s_pix_tvalid and pix_ready) = '0');
+      v_abort := (s_cfg_tvalid = '1' and unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND and s_cfg_tdata(1) = '1')
+                 or (v_abort and (s_pix_tvalid and pix_ready) = '0');
       v_waits := rst = '0' and s_pix_tvalid = '1' and pix_ready = '0' and not v_abort;
       v_last  := s_pix_tlast;
     end if;

@@ -5,7 +5,7 @@
 --   Clocks    : from the start command to the last map beat (port tile_clocks), without stalls outside,
 --                 win_cols * win_rows + tile_cols * tile_rows
 --               + ceil(planes / G_LANES) * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
---               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 42 + G_LANES + G_MNCC_W + G_FRAC_W - 3 G_RECTIFIED
+--               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 45 + G_LANES + G_MNCC_W + G_FRAC_W - 3 G_RECTIFIED
 --               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
 --   Numbers   : docs/numeric_contract.md
 --   Lanes     : G_LANES planes (1, 2 or 4) are swept at once over one image buffer and one map, with the same results
@@ -122,6 +122,7 @@ architecture rtl of psweep is
   signal pipe_rst : std_logic; -- also an abort clears what is on its way
 
   -- Registers and table writes.
+  signal cfg_data     : std_logic_vector(31 downto 0);
   signal table_we     : std_logic;
   signal table_addr   : std_logic_vector(clog2(G_PLANES) + 2 downto 0);
   -- Lane and word of a table write: plane n * G_LANES + lane is entry n of the lane.
@@ -159,7 +160,6 @@ architecture rtl of psweep is
   signal map_more          : std_logic;
   signal map_valid         : std_logic;
   signal unload_done       : std_logic;
-  signal map_ready         : std_logic;
   -- address_generator to storage.
   signal address_valid          : std_logic_vector(G_LANES - 1 downto 0);
   signal address_row_first      : std_logic_vector(G_LANES - 1 downto 0);
@@ -247,6 +247,7 @@ begin
       s_pix_tvalid  => s_pix_tvalid,
       s_pix_tready  => s_pix_tready,
       s_pix_tlast   => s_pix_tlast,
+      cfg_data      => cfg_data,
       table_we      => table_we,
       table_addr    => table_addr,
       offset_we     => offset_we,
@@ -318,7 +319,7 @@ begin
         table_addr       => lane_addr,
         offset_we        => offset_we,
         offset_addr      => offset_addr,
-        cfg_data         => s_cfg_tdata(31 downto 0),
+        cfg_data         => cfg_data,
         win_last_col     => win_last_col,
         win_last_row     => win_last_row,
         left_x_lo        => left_x_lo,
@@ -503,7 +504,7 @@ begin
       unload_more        => map_more,
       unload_done        => unload_done,
       m_tvalid           => map_valid,
-      m_tready           => map_ready,
+      m_tready           => m_map_tready,
       m_tdata            => m_map_tdata,
       m_tlast            => m_map_tlast,
       dbg_map_we         => dbg_map_we,
@@ -516,9 +517,8 @@ begin
       dbg_map_prev_valid => dbg_map_prev_valid
     );
 
-  -- In the clock after the abort command updating has not yet heard of it.
+  -- In the clock of map_abort updating still shows a beat, and forgets it.
   m_map_tvalid <= map_valid and not map_abort;
-  map_ready    <= m_map_tready and not map_abort;
 
   dbg_sample_valid <= address_valid;
   dbg_xi_left      <= address_xi_left;

@@ -80,7 +80,7 @@ package body psweep_pkg is
 
   function updating_latency (frac_w, lanes : integer) return positive is
   begin
-    return 3 + lanes + frac_w;
+    return 4 + lanes + frac_w;
   end function updating_latency;
 
   function clog2 (n : integer) return positive is

@@ -2,8 +2,8 @@
 -- ram_2r: true dual-port RAM, one port that writes or reads and one that reads, one clock. What two lanes share: while
 --         a tile is swept nobody writes, so both ports of one block RAM are free to read.
 --   Rate      : a: one write or read per clock; b: one read per clock
---   Latency   : 2 clocks from a_addr to a_rdata and from b_addr to b_rdata (with the RAM's output register)
---   Parts     : as ram_deep; the choice among them lies in front of the second register
+--   Latency   : 2 clocks from a_addr to a_rdata and from b_addr to b_rdata (with the output registers of the blocks)
+--   Parts     : as ram_deep with latency 2: the choice among them lies behind these registers
 --   Collision : in the clock of a write a_rdata is undefined, and so is b_rdata if b_addr is the word written ('X' in
 --               simulation)
 --   Addresses : 0 .. G_DEPTH-1 in every clock, whether or not the data are used; beyond, a simulation stops
@@ -66,6 +66,11 @@ architecture rtl of ram_2r is
   signal b_part  : t_parts;
   signal a_words : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
   signal b_words : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  -- A clock later.
+  signal a_shown  : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  signal b_shown  : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  signal a_chosen : t_parts;
+  signal b_chosen : t_parts;
 
 begin
 
@@ -124,15 +129,20 @@ begin
 
   end generate g_parts;
 
-  p_pick : process (clk)
+  p_output : process (clk)
   begin
     if rising_edge(clk) then
-      a_part  <= a_now;
-      b_part  <= behind(b_addr);
-      a_rdata <= pick(a_words, a_part);
-      b_rdata <= pick(b_words, b_part);
+      a_part   <= a_now;
+      b_part   <= behind(b_addr);
+      a_shown  <= a_words;
+      b_shown  <= b_words;
+      a_chosen <= a_part;
+      b_chosen <= b_part;
     end if;
-  end process p_pick;
+  end process p_output;
+
+  a_rdata <= pick(a_shown, a_chosen);
+  b_rdata <= pick(b_shown, b_chosen);
 
   -- synthesis translate_off
   p_rules : process (clk)

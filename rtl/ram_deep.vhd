@@ -6,7 +6,10 @@
 --               power of two instead of a rest that is less than 2048 words from it: 32760 words are 32768 (deep_part)
 --   G_NINES   : so many low bits (a multiple of 9) of parts from 8192 words on are kept in a RAM of their own, which
 --               fits into blocks of 4096 * 9 bits: 8 blocks for 9 bits of 32768 words, not 9, and a multiplexer. 0: no
---   Others    : latency 1, collision, addresses and reset as ram_sdp
+--   Latency   : G_LATENCY = 1 or 2 clocks from raddr to rdata. 2: each part's block has its output register, and the
+--               choice among the parts lies behind it, so that no logic waits for a block. While oce = '0' these
+--               registers hold; with latency 1 nobody looks at oce
+--   Others    : collision, addresses and reset as ram_sdp
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
@@ -14,9 +17,10 @@ library ieee;
 
 entity ram_deep is
   generic (
-    G_DATA_W : integer := 16;
-    G_DEPTH  : integer := 49280;
-    G_NINES  : integer := 0
+    G_DATA_W  : integer := 16;
+    G_DEPTH   : integer := 49280;
+    G_NINES   : integer := 0;
+    G_LATENCY : integer := 1
   );
   port (
     clk   : in  std_logic;
@@ -24,6 +28,7 @@ entity ram_deep is
     waddr : in  std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
     wdata : in  std_logic_vector(G_DATA_W - 1 downto 0);
     raddr : in  std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
+    oce   : in  std_logic := '1';
     rdata : out std_logic_vector(G_DATA_W - 1 downto 0)
   );
 end entity ram_deep;
@@ -52,6 +57,9 @@ architecture rtl of ram_deep is
   signal w_behind : t_parts;
   signal r_behind : t_parts;
   signal words    : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  -- What rdata is chosen from: words, or the registers behind them.
+  signal shown    : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  signal chosen   : t_parts;
 
 begin
 
@@ -63,6 +71,9 @@ begin
     severity failure;
   assert G_NINES >= 0 and G_NINES <= G_DATA_W and G_NINES mod 9 = 0
     report "ram_deep: G_NINES=" & integer'image(G_NINES) & " is no multiple of 9 up to G_DATA_W"
+    severity failure;
+  assert G_LATENCY >= 1 and G_LATENCY <= 2
+    report "ram_deep: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..2"
     severity failure;
 
   w_behind <= behind(waddr);
@@ -137,12 +148,31 @@ begin
     end if;
   end process p_part;
 
-  p_pick : process (words, r_behind)
+  g_direct : if G_LATENCY = 1 generate
+    shown  <= words;
+    chosen <= r_behind;
+  end generate g_direct;
+
+  g_output_register : if G_LATENCY /= 1 generate
+
+    p_output : process (clk)
+    begin
+      if rising_edge(clk) then
+        if oce = '1' then
+          shown  <= words;
+          chosen <= r_behind;
+        end if;
+      end if;
+    end process p_output;
+
+  end generate g_output_register;
+
+  p_pick : process (shown, chosen)
   begin
-    rdata <= words(G_DATA_W - 1 downto 0);
+    rdata <= shown(G_DATA_W - 1 downto 0);
     for i in 1 to C_PARTS - 1 loop
-      if r_behind(i) = '1' then
-        rdata <= words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
+      if chosen(i) = '1' then
+        rdata <= shown((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
       end if;
     end loop;
   end process p_pick;

@@ -113,13 +113,9 @@ architecture rtl of storage is
   signal s1_addr_1 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
   signal s1_addr_2 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
   signal s1_addr_3 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
-  signal s2_word_0 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_0 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
-  signal s2_word_1 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_1 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
-  signal s2_word_2 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_2 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
-  signal s2_word_3 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0); -- one lane
   signal s3_word_3 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
   signal s4_p00    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
   signal s4_p10    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
@@ -280,49 +276,49 @@ begin
     g_one : if G_LANES = 1 generate
 
       u_bank_0 : entity work.ram_deep
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
         port map (
           clk   => clk,
           we    => write_bank(0),
           waddr => write_addr,
           wdata => write_pixel,
           raddr => s1_addr_0((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s2_word_0((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+          rdata => s3_word_0((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
         );
 
       u_bank_1 : entity work.ram_deep
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
         port map (
           clk   => clk,
           we    => write_bank(1),
           waddr => write_addr,
           wdata => write_pixel,
           raddr => s1_addr_1((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s2_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+          rdata => s3_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
         );
 
       g_lower : if G_RECTIFIED = 0 generate
 
         u_bank_2 : entity work.ram_deep
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
           port map (
             clk   => clk,
             we    => write_bank(2),
             waddr => write_addr,
             wdata => write_pixel,
             raddr => s1_addr_2((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-            rdata => s2_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+            rdata => s3_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
           );
 
         u_bank_3 : entity work.ram_deep
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
+          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
           port map (
             clk   => clk,
             we    => write_bank(3),
             waddr => write_addr,
             wdata => write_pixel,
             raddr => s1_addr_3((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-            rdata => s2_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+            rdata => s3_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
           );
 
       end generate g_lower;
@@ -394,26 +390,7 @@ begin
 
   end generate g_image;
 
-  g_words : if G_LANES = 1 generate
-
-    p_words : process (clk)
-    begin
-      if rising_edge(clk) then
-        s3_word_0 <= s2_word_0;
-        s3_word_1 <= s2_word_1;
-        if G_RECTIFIED = 0 then
-          s3_word_2 <= s2_word_2;
-          s3_word_3 <= s2_word_3;
-        else
-          s3_word_2 <= (others => '0');
-          s3_word_3 <= (others => '0');
-        end if;
-      end if;
-    end process p_words;
-
-  end generate g_words;
-
-  g_no_lower : if G_LANES > 1 and G_RECTIFIED = 1 generate
+  g_no_lower : if G_RECTIFIED = 1 generate
     s3_word_2 <= (others => '0');
     s3_word_3 <= (others => '0');
   end generate g_no_lower;

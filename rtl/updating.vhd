@@ -7,7 +7,7 @@
 --   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage a
 --             lane in the order of planes, and is written once. Of the parabolas due in a set only the last one counts
 --             (a better V later in the set voids those before it), so there is one divider
---   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 2 clocks to
+--   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 3 clocks to
 --             the first beat
 --   Numbers : V ufix(0,G_MNCC_W); fraction a / (a + c) = offset + 1/2, ufix(0,G_FRAC_W), truncated
 --   Planes  : sets are counted here, by s_last; set 0 ignores the stored word, so the map is never cleared. A set must
@@ -82,6 +82,7 @@ architecture rtl of updating is
   signal read_cell : unsigned(C_ADDR_W - 1 downto 0);
   signal held_cell : unsigned(C_ADDR_W - 1 downto 0); -- the one read in the clock before
   signal last_cell : unsigned(C_ADDR_W - 1 downto 0); -- of the tile
+  signal at_last_cell : std_logic; -- in unload
   signal plane_set : unsigned(C_SET_W - 1 downto 0);
   signal set_before : unsigned(C_SET_W - 1 downto 0); -- plane_set - 1
   signal first     : std_logic;                        -- set 0
@@ -106,8 +107,18 @@ architecture rtl of updating is
   signal s1_first    : std_logic;
   signal s1_set      : unsigned(C_SET_W - 1 downto 0);
   signal s1_before   : unsigned(C_SET_W + C_LANE_W - 1 downto 0); -- the plane before lane 0's
+  -- s2: the same, while the word is in the RAM's output register.
+  signal s2_valid    : std_logic;
+  signal s2_last     : std_logic;
+  signal s2_on       : std_logic_vector(G_LANES - 1 downto 0);
+  signal s2_inside   : std_logic_vector(G_LANES - 1 downto 0);
+  signal s2_textured : std_logic_vector(G_LANES - 1 downto 0);
+  signal s2_v        : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
+  signal s2_first    : std_logic;
+  signal s2_set      : unsigned(C_SET_W - 1 downto 0);
+  signal s2_before   : unsigned(C_SET_W + C_LANE_W - 1 downto 0);
 
-  -- One stage per lane from s2 on. Of each signal element n enters the stage of lane n, and element G_LANES is s3, the
+  -- One stage per lane from s3 on. Of each signal element n enters the stage of lane n, and element G_LANES is s4, the
   -- word to be written but for its fraction, and whether there is a parabola. Of the parabola the lanes pass on the
   -- values beside the best one; the last of them makes best - prev and 2 best - prev - v.
   signal way_in_valid  : std_logic_vector(G_LANES downto 0);
@@ -117,6 +128,7 @@ architecture rtl of updating is
   signal way_prev      : std_logic_vector((G_LANES + 1) * G_MNCC_W - 1 downto 0);
   signal way_plane     : std_logic_vector((G_LANES + 1) * C_PLANE_W - 1 downto 0);
   signal way_frac      : std_logic_vector((G_LANES + 1) * G_FRAC_W - 1 downto 0);
+  signal way_won       : std_logic_vector(G_LANES downto 0);
   signal way_local_max : std_logic_vector(G_LANES downto 0);
   signal way_prev_ok   : std_logic_vector(G_LANES downto 0);
   signal way_before    : std_logic_vector(G_LANES downto 0); -- the best plane is the one before this lane's
@@ -124,11 +136,11 @@ architecture rtl of updating is
   signal way_lower     : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0); -- V of the plane before the best one
   signal way_upper     : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0); -- and of the one behind it
 
-  signal s3_word : std_logic_vector(C_WORD_W - 1 downto 0);
-  signal s3_rise : unsigned(G_MNCC_W - 1 downto 0);
-  signal s3_both : unsigned(G_MNCC_W downto 0);
-  signal s3_num  : std_logic_vector(G_MNCC_W + 1 downto 0);
-  signal s3_wait : std_logic_vector(C_WAIT_W - 1 downto 0);
+  signal s4_word : std_logic_vector(C_WORD_W - 1 downto 0);
+  signal s4_rise : unsigned(G_MNCC_W - 1 downto 0);
+  signal s4_both : unsigned(G_MNCC_W downto 0);
+  signal s4_num  : std_logic_vector(G_MNCC_W + 1 downto 0);
+  signal s4_wait : std_logic_vector(C_WAIT_W - 1 downto 0);
 
   -- Behind the divider, and the write.
   signal way_valid  : std_logic_vector(G_FRAC_W downto 0);
@@ -138,10 +150,14 @@ architecture rtl of updating is
   signal write_cell : unsigned(C_ADDR_W - 1 downto 0);
   signal write_word : std_logic_vector(C_WORD_W - 1 downto 0);
 
-  -- Unload: fetched = word holds the next beat.
-  signal unloading    : std_logic; -- cells are left to fetch
+  -- Unload, in two places: read = the RAM shows a beat, fetched = word, in its output register, is the next beat.
+  signal unloading    : std_logic; -- cells are left to read
+  signal read         : std_logic;
+  signal read_last    : std_logic;
+  signal read_moves   : std_logic; -- and makes room for the next one
   signal fetched      : std_logic;
   signal fetched_last : std_logic;
+  signal word_moves   : std_logic;
   signal fetch        : std_logic;
   signal out_ready    : std_logic;
   signal mask         : std_logic_vector(3 downto 0);
@@ -173,12 +189,13 @@ begin
   clear <= rst or cancel or start;
 
   -- Map --------------------------------------------------------------------------------------------------------------
-  raddr <= std_logic_vector(held_cell) when fetched = '1' and out_ready = '0' else std_logic_vector(read_cell);
+  raddr <= std_logic_vector(held_cell) when read = '1' and word_moves = '0' else std_logic_vector(read_cell);
 
   u_map : entity work.ram_deep
     generic map (
-      G_DATA_W => C_WORD_W,
-      G_DEPTH  => imax(G_CELLS, 2)  -- GHDL 2.0 cannot convert a RAM of one word
+      G_DATA_W  => C_WORD_W,
+      G_DEPTH   => imax(G_CELLS, 2), -- GHDL 2.0 cannot convert a RAM of one word
+      G_LATENCY => 2
     )
     port map (
       clk   => clk,
@@ -186,6 +203,7 @@ begin
       waddr => std_logic_vector(write_cell),
       wdata => write_word,
       raddr => raddr,
+      oce   => word_moves,
       rdata => word
     );
 
@@ -210,12 +228,8 @@ begin
         else
           read_cell <= read_cell + 1;
         end if;
-      elsif fetch = '1' then
-        if read_cell = last_cell then
-          read_cell <= (others => '0');
-        else
-          read_cell <= read_cell + 1;
-        end if;
+      elsif fetch = '1' and at_last_cell = '0' then -- the last one stays: an address that the map has, until start
+        read_cell <= read_cell + 1;
       end if;
       if clear = '1' then
         read_cell <= (others => '0');
@@ -250,28 +264,41 @@ begin
       for k in 0 to C_LANE_W - 1 loop
         s1_before(k) <= '1';
       end loop;
-      -- s2: the stored word, empty at set 0
-      way_in_valid(0)                      <= s1_valid;
-      way_in_last(0)                       <= s1_last;
-      way_set(C_SET_W - 1 downto 0)        <= std_logic_vector(s1_set);
+      -- s2
+      s2_valid    <= s1_valid;
+      s2_last     <= s1_last;
+      s2_on       <= s1_on;
+      s2_inside   <= s1_inside;
+      s2_textured <= s1_textured;
+      s2_v        <= s1_v;
+      s2_first    <= s1_first;
+      s2_set      <= s1_set;
+      s2_before   <= s1_before;
+      -- s3: the stored word, empty at set 0
+      way_in_valid(0)                      <= s2_valid;
+      way_in_last(0)                       <= s2_last;
+      way_set(C_SET_W - 1 downto 0)        <= std_logic_vector(s2_set);
       way_best(G_MNCC_W - 1 downto 0)      <= word_best;
       way_prev(G_MNCC_W - 1 downto 0)      <= word_prev;
       way_plane(C_PLANE_W - 1 downto 0)    <= word_plane;
       way_frac(G_FRAC_W - 1 downto 0)      <= word_frac;
+      way_won(0)                           <= to_bit(unsigned(word_best) /= 0);
       way_local_max(0)                     <= word_local_max;
       way_prev_ok(0)                       <= word_prev_valid;
-      way_before(0)                        <= to_bit(unsigned(word_plane) = resize(s1_before, C_PLANE_W));
-      if s1_first = '1' then
+      way_before(0)                        <= to_bit(unsigned(word_plane) = resize(s2_before, C_PLANE_W));
+      if s2_first = '1' then
         way_best(G_MNCC_W - 1 downto 0)    <= (others => '0');
         way_prev(G_MNCC_W - 1 downto 0)    <= (others => '0');
         way_plane(C_PLANE_W - 1 downto 0)  <= (others => '0');
         way_frac(G_FRAC_W - 1 downto 0)    <= (others => '0');
+        way_won(0)                         <= '0';
         way_local_max(0)                   <= '0';
         way_prev_ok(0)                     <= '0';
         way_before(0)                      <= '0';
       end if;
       if rst = '1' or cancel = '1' then
         s1_valid        <= '0';
+        s2_valid        <= '0';
         way_in_valid(0) <= '0';
       end if;
     end if;
@@ -297,7 +324,8 @@ begin
     signal old_plane     : std_logic_vector(C_PLANE_W - 1 downto 0);
     signal old_frac      : std_logic_vector(G_FRAC_W - 1 downto 0);
     signal better        : std_logic;
-    signal won           : std_logic; -- there is a winner
+    signal won           : std_logic; -- there is a winner: old_best is not 0
+    signal new_won       : std_logic;
     signal adjacent      : std_logic; -- and it is the plane before this one
     signal new_best      : unsigned(G_MNCC_W - 1 downto 0);
     signal new_prev      : unsigned(G_MNCC_W - 1 downto 0);
@@ -317,8 +345,8 @@ begin
     p_side : process (clk)
     begin
       if rising_edge(clk) then
-        side(C_SIDE_W - 1 downto 0) <= s1_on(n) & s1_inside(n) & s1_textured(n)
-                                       & s1_v((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W);
+        side(C_SIDE_W - 1 downto 0) <= s2_on(n) & s2_inside(n) & s2_textured(n)
+                                       & s2_v((n + 1) * G_MNCC_W - 1 downto n * G_MNCC_W);
         for k in 1 to n loop
           side((k + 1) * C_SIDE_W - 1 downto k * C_SIDE_W) <= side(k * C_SIDE_W - 1 downto (k - 1) * C_SIDE_W);
         end loop;
@@ -338,7 +366,7 @@ begin
     old_frac  <= way_frac((n + 1) * G_FRAC_W - 1 downto n * G_FRAC_W);
 
     better   <= inside and to_bit(v > old_best) and on_q;
-    won      <= to_bit(old_best /= 0);
+    won      <= way_won(n);
     adjacent <= won and way_before(n) and on_q;
     -- Without a parabola these mean nothing: the first lane need not choose.
     lower    <= old_prev when n = 0 or adjacent = '1'
@@ -353,6 +381,7 @@ begin
         new_last     <= way_in_last(n);
         new_set      <= set_now;
         new_before   <= better;
+        new_won      <= won or better;
         new_best     <= old_best;
         new_prev     <= old_prev;
         new_prev_ok  <= way_prev_ok(n);
@@ -389,6 +418,7 @@ begin
     way_in_valid(n + 1)  <= new_valid;
     way_in_last(n + 1)   <= new_last;
     way_before(n + 1)    <= new_before;
+    way_won(n + 1)       <= new_won;
     way_local_max(n + 1) <= new_local_max;
     way_prev_ok(n + 1)   <= new_prev_ok;
     way_parabola(n + 1)  <= new_parabola;
@@ -415,8 +445,8 @@ begin
       p_operands : process (clk)
       begin
         if rising_edge(clk) then
-          s3_rise <= old_best - lower;
-          s3_both <= (old_best & '0') - resize(lower, G_MNCC_W + 1) - resize(upper, G_MNCC_W + 1);
+          s4_rise <= old_best - lower;
+          s4_both <= (old_best & '0') - resize(lower, G_MNCC_W + 1) - resize(upper, G_MNCC_W + 1);
         end if;
       end process p_operands;
 
@@ -424,13 +454,13 @@ begin
 
   end generate g_lane;
 
-  s3_word <= way_best((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W)
+  s4_word <= way_best((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W)
              & way_prev((G_LANES + 1) * G_MNCC_W - 1 downto G_LANES * G_MNCC_W)
              & way_plane((G_LANES + 1) * C_PLANE_W - 1 downto G_LANES * C_PLANE_W)
              & way_frac((G_LANES + 1) * G_FRAC_W - 1 downto G_LANES * G_FRAC_W)
              & way_local_max(G_LANES) & way_prev_ok(G_LANES);
-  s3_num  <= "00" & std_logic_vector(s3_rise);
-  s3_wait <= way_parabola(G_LANES) & s3_word;
+  s4_num  <= "00" & std_logic_vector(s4_rise);
+  s4_wait <= way_parabola(G_LANES) & s4_word;
 
   u_divider : entity work.divider
     generic map (
@@ -439,8 +469,8 @@ begin
     )
     port map (
       clk    => clk,
-      s_num  => s3_num,
-      s_den  => std_logic_vector(s3_both),
+      s_num  => s4_num,
+      s_den  => std_logic_vector(s4_both),
       m_quot => quot
     );
 
@@ -452,7 +482,7 @@ begin
     port map (
       clk    => clk,
       ce     => '1',
-      s_data => s3_wait,
+      s_data => s4_wait,
       m_data => waited
     );
 
@@ -489,25 +519,32 @@ begin
   dbg_map_best       <= write_word(C_WORD_W - 1 downto G_MNCC_W + C_PLANE_W + G_FRAC_W + 2);
 
   -- Unload -----------------------------------------------------------------------------------------------------------
-  -- The map has no read enable: a word that is not taken is kept by reading it again.
-  fetch <= unloading and (not fetched or out_ready);
+  at_last_cell <= to_bit(read_cell = last_cell);
+
+  -- The map has no read enable: a word that cannot move on is kept by reading it again. Its output register has one.
+  word_moves <= out_ready or not fetched;
+  read_moves <= word_moves or not read;
+  fetch      <= unloading and read_moves;
 
   p_unload : process (clk)
   begin
     if rising_edge(clk) then
       if unload = '1' then
         unloading <= '1';
-      elsif fetch = '1' and read_cell = last_cell then
+      elsif fetch = '1' and at_last_cell = '1' then
         unloading <= '0';
       end if;
-      if fetch = '1' then
-        fetched      <= '1';
-        fetched_last <= to_bit(read_cell = last_cell);
-      elsif out_ready = '1' then
-        fetched <= '0';
+      if read_moves = '1' then
+        read      <= unloading;
+        read_last <= at_last_cell;
+      end if;
+      if word_moves = '1' then
+        fetched      <= read;
+        fetched_last <= read_last;
       end if;
       if rst = '1' or cancel = '1' then
         unloading <= '0';
+        read      <= '0';
         fetched   <= '0';
       end if;
     end if;
@@ -539,7 +576,7 @@ begin
   m_tvalid    <= beat_valid;
   m_tlast     <= beat(C_DATA_W);
   m_tdata     <= beat(C_DATA_W - 1 downto 0);
-  unload_more <= unloading or fetched;
+  unload_more <= unloading or read or fetched;
   unload_done <= beat_valid and m_tready and beat(C_DATA_W);
 
   -- synthesis translate_off
@@ -548,7 +585,7 @@ begin
     variable v_way : std_logic; -- a cell is on its way to the map
   begin
     if rising_edge(clk) then
-      v_way := s_valid(0) or s1_valid;
+      v_way := s_valid(0) or s1_valid or s2_valid;
       for n in 0 to G_LANES loop
         v_way := v_way or way_in_valid(n);
       end loop;
@@ -558,10 +595,10 @@ begin
       assert unload /= '1' or v_way = '0'
         report "updating: unloading begins while cells are on their way to the map"
         severity failure;
-      assert s_valid(0) /= '1' or (unloading or fetched) = '0'
+      assert s_valid(0) /= '1' or (unloading or read or fetched) = '0'
         report "updating: a cell comes while the map is unloaded"
         severity failure;
-      assert s1_valid /= '1' or s1_first = '1' or not is_x(word)
+      assert s2_valid /= '1' or s2_first = '1' or not is_x(word)
         report "updating: a cell of the map is unknown: never written, or read in the clock of its write"
         severity failure;
       assert fetched /= '1' or not is_x(word)
@@ -571,7 +608,7 @@ begin
         report "updating: more cells than the map has"
         severity failure;
       if way_in_valid(G_LANES) = '1' and way_parabola(G_LANES) = '1' then
-        assert s3_rise <= s3_both and s3_both /= 0
+        assert s4_rise <= s4_both and s4_both /= 0
           report "updating: the parabola's quotient is not in 0..1"
           severity failure;
       end if;
