@@ -4,7 +4,7 @@ psweep_pkg.vhd
 ram_sdp.vhd
 ram_2r.vhd
 ram_deep.vhd
-stream_reg.vhd
+stream_fifo.vhd
 control.vhd
 address_generator.vhd
 storage.vhd

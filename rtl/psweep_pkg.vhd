@@ -62,8 +62,10 @@ package psweep_pkg is
   function bank_bits (cols, rows, rectified : integer) return positive;
 
   -- Words of part n of a RAM of many words, parts being powers of two, largest first; 0: there is no such part
-  -- (ram_deep, ram_2r). And the number of parts, 1 .. 4.
+  -- (ram_deep, ram_2r). The address at which it starts, a multiple of the size of the part before it. And the number of
+  -- parts, 1 .. 4.
   function deep_part (depth, n : integer) return integer;
+  function deep_start (depth, n : integer) return integer;
   function deep_parts (depth : integer) return positive;
 
   -- true is '1'
@@ -133,6 +135,7 @@ package body psweep_pkg is
     constant C_MOST  : integer := 4;    -- parts: a multiplexer of one LUT6 a bit
     constant C_GRAIN : integer := 2048; -- a block of 16 or 18 bits: less is not worth a part
     constant C_LEAST : integer := 512;  -- half a block of 36 bits
+    constant C_CAP   : integer := 16384; -- the deepest block that many devices have, of 1 or 2 bits
     variable v_left  : integer;
     variable v_size  : integer;
   begin
@@ -148,11 +151,23 @@ package body psweep_pkg is
         if v_size - v_left >= C_GRAIN and i < C_MOST - 1 then
           v_size := v_size / 2;
         end if;
+        if v_size > C_CAP and depth <= C_MOST * C_CAP then
+          v_size := C_CAP;
+        end if;
       end if;
       v_left := v_left - v_size;
     end loop;
     return v_size;
   end function deep_part;
+
+  function deep_start (depth, n : integer) return integer is
+    variable v_start : integer := 0;
+  begin
+    for i in 0 to n - 1 loop
+      v_start := v_start + deep_part(depth, i);
+    end loop;
+    return v_start;
+  end function deep_start;
 
   function deep_parts (depth : integer) return positive is
     variable v_count : positive := 1;

@@ -2,13 +2,13 @@
 -- ram_deep: ram_sdp for many words, in parts of 2**k words. Block RAMs are 2**k words deep (32768 of 1 bit, 16384 of 2
 --           bits, ..), so a part needs no multiplexer, where a RAM of any depth is made of as many short and wide
 --           blocks as its depth takes, with a multiplexer over all of them.
---   Parts     : at most four, the largest power of two that fits first: 49280 words are 32768 + 16384 + 512. One more
---               power of two instead of a rest that is less than 2048 words from it: 32760 words are 32768 (deep_part)
+--   Parts     : at most four, the largest power of two that fits first, up to 16384 if that is enough: 49280 words are
+--               3 * 16384 + 512. One more power of two instead of a rest that is less than 2048 words from it: 16000
+--               words are 16384 (deep_part)
 --   G_NINES   : so many low bits (a multiple of 9) of parts from 8192 words on are kept in a RAM of their own, which
 --               fits into blocks of 4096 * 9 bits: 8 blocks for 9 bits of 32768 words, not 9, and a multiplexer. 0: no
 --   Latency   : G_LATENCY = 1 or 2 clocks from raddr to rdata. 2: each part's block has its output register, and the
---               choice among the parts lies behind it, so that no logic waits for a block. While oce = '0' these
---               registers hold; with latency 1 nobody looks at oce
+--               choice among the parts lies behind it, so that no logic waits for a block
 --   Others    : collision, addresses and reset as ram_sdp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -28,7 +28,6 @@ entity ram_deep is
     waddr : in  std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
     wdata : in  std_logic_vector(G_DATA_W - 1 downto 0);
     raddr : in  std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
-    oce   : in  std_logic := '1';
     rdata : out std_logic_vector(G_DATA_W - 1 downto 0)
   );
 end entity ram_deep;
@@ -41,15 +40,16 @@ architecture rtl of ram_deep is
 
   subtype t_parts is std_logic_vector(C_PARTS downto 0);
 
-  -- Bit n: the address is not in a part before n. Sizes are falling powers of two, and all that follows a part is not
-  -- larger than it: so one address bit says whether the address lies behind it. The bit above the last part is '0'.
+  -- Bit n: the address is not in a part before n. A part starts at a multiple of the size of the one before it, so the
+  -- few bits above that tell. The bit above the last part is '0'.
   function behind (address : t_address) return std_logic_vector is
     variable v_behind : t_parts;
   begin
     v_behind    := (others => '0');
     v_behind(0) := '1';
     for i in 1 to C_PARTS - 1 loop
-      v_behind(i) := v_behind(i - 1) and address(clog2(deep_part(G_DEPTH, i - 1)));
+      v_behind(i) := to_bit(shift_right(unsigned(address), clog2(deep_part(G_DEPTH, i - 1)))
+                            >= deep_start(G_DEPTH, i) / deep_part(G_DEPTH, i - 1));
     end loop;
     return v_behind;
   end function behind;
@@ -158,10 +158,8 @@ begin
     p_output : process (clk)
     begin
       if rising_edge(clk) then
-        if oce = '1' then
-          shown  <= words;
-          chosen <= r_behind;
-        end if;
+        shown  <= words;
+        chosen <= r_behind;
       end if;
     end process p_output;
 

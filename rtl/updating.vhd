@@ -7,7 +7,7 @@
 --   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage a
 --             lane in the order of planes, and is written once. Of the parabolas due in a set only the last one counts
 --             (a better V later in the set voids those before it), so there is one divider
---   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 3 clocks to
+--   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 5 clocks to
 --             the first beat
 --   Numbers : V ufix(0,G_MNCC_W); fraction a / (a + c) = offset + 1/2, ufix(0,G_FRAC_W), truncated
 --   Planes  : sets are counted here, by s_last; set 0 ignores the stored word, so the map is never cleared. A set must
@@ -80,13 +80,11 @@ architecture rtl of updating is
 
   -- Read side: the cell to be read next, in sweep and unload.
   signal read_cell : unsigned(C_ADDR_W - 1 downto 0);
-  signal held_cell : unsigned(C_ADDR_W - 1 downto 0); -- the one read in the clock before
   signal last_cell : unsigned(C_ADDR_W - 1 downto 0); -- of the tile
   signal at_last_cell : std_logic; -- in unload
   signal plane_set : unsigned(C_SET_W - 1 downto 0);
   signal set_before : unsigned(C_SET_W - 1 downto 0); -- plane_set - 1
   signal first     : std_logic;                        -- set 0
-  signal raddr     : std_logic_vector(C_ADDR_W - 1 downto 0);
   signal word      : std_logic_vector(C_WORD_W - 1 downto 0);
 
   -- Fields of the word that comes out of the map.
@@ -150,16 +148,23 @@ architecture rtl of updating is
   signal write_cell : unsigned(C_ADDR_W - 1 downto 0);
   signal write_word : std_logic_vector(C_WORD_W - 1 downto 0);
 
-  -- Unload, in two places: read = the RAM shows a beat, fetched = word, in its output register, is the next beat.
+  -- Unload: a cell is read, is in the RAM's output register (fetched), is a beat (sent), and goes into a FIFO. Cells are read only while
+  -- it is less than half full, so none on its way has to wait.
   signal unloading    : std_logic; -- cells are left to read
+  signal fetch        : std_logic;
   signal read         : std_logic;
   signal read_last    : std_logic;
-  signal read_moves   : std_logic; -- and makes room for the next one
   signal fetched      : std_logic;
   signal fetched_last : std_logic;
-  signal word_moves   : std_logic;
-  signal fetch        : std_logic;
-  signal out_ready    : std_logic;
+  signal sent           : std_logic; -- out_data is the next beat
+  signal sent_last      : std_logic;
+  signal sent_best      : unsigned(G_MNCC_W - 1 downto 0);
+  signal sent_plane     : std_logic_vector(C_PLANE_W - 1 downto 0);
+  signal sent_frac      : std_logic_vector(G_FRAC_W - 1 downto 0);
+  signal sent_local_max : std_logic;
+  signal few          : std_logic;
+  signal behind       : std_logic; -- beats behind the one that is shown
+  signal out_ready    : std_logic; -- always '1' when it matters
   signal mask         : std_logic_vector(3 downto 0);
   signal empty        : std_logic; -- no winner
   signal out_data     : std_logic_vector(C_DATA_W downto 0);
@@ -189,8 +194,6 @@ begin
   clear <= rst or cancel or start;
 
   -- Map --------------------------------------------------------------------------------------------------------------
-  raddr <= std_logic_vector(held_cell) when read = '1' and word_moves = '0' else std_logic_vector(read_cell);
-
   u_map : entity work.ram_deep
     generic map (
       G_DATA_W  => C_WORD_W,
@@ -202,8 +205,7 @@ begin
       we    => way_valid(G_FRAC_W),
       waddr => std_logic_vector(write_cell),
       wdata => write_word,
-      raddr => raddr,
-      oce   => word_moves,
+      raddr => std_logic_vector(read_cell),
       rdata => word
     );
 
@@ -217,7 +219,6 @@ begin
   p_read : process (clk)
   begin
     if rising_edge(clk) then
-      held_cell <= unsigned(raddr);
       if s_valid(0) = '1' then
         if s_last = '1' then
           read_cell <= (others => '0');
@@ -235,9 +236,6 @@ begin
         read_cell <= (others => '0');
         plane_set <= (others => '0');
         first     <= '1';
-      end if;
-      if rst = '1' then
-        held_cell <= (others => '0'); -- addresses are legal from the first clock on
       end if;
     end if;
   end process p_read;
@@ -521,10 +519,7 @@ begin
   -- Unload -----------------------------------------------------------------------------------------------------------
   at_last_cell <= to_bit(read_cell = last_cell);
 
-  -- The map has no read enable: a word that cannot move on is kept by reading it again. Its output register has one.
-  word_moves <= out_ready or not fetched;
-  read_moves <= word_moves or not read;
-  fetch      <= unloading and read_moves;
+  fetch        <= unloading and few;
 
   p_unload : process (clk)
   begin
@@ -534,14 +529,10 @@ begin
       elsif fetch = '1' and at_last_cell = '1' then
         unloading <= '0';
       end if;
-      if read_moves = '1' then
-        read      <= unloading;
-        read_last <= at_last_cell;
-      end if;
-      if word_moves = '1' then
-        fetched      <= read;
-        fetched_last <= read_last;
-      end if;
+      read         <= fetch;
+      read_last    <= at_last_cell;
+      fetched      <= read;
+      fetched_last <= read_last;
       if rst = '1' or cancel = '1' then
         unloading <= '0';
         read      <= '0';
@@ -550,24 +541,42 @@ begin
     end if;
   end process p_unload;
 
-  empty   <= to_bit(unsigned(word_best) = 0);
-  mask(0) <= empty and not word_frac(0);
-  mask(1) <= empty and word_frac(0) and not word_frac(1);
-  mask(2) <= to_bit(unsigned(word_best) < unsigned(threshold)) and not (empty and not (word_frac(0) and word_frac(1)));
-  mask(3) <= not word_local_max and not (empty and not (word_frac(0) and word_frac(1)));
+  p_beat : process (clk)
+  begin
+    if rising_edge(clk) then
+      sent           <= fetched;
+      sent_last      <= fetched_last;
+      sent_best      <= unsigned(word_best);
+      sent_plane     <= word_plane;
+      sent_frac      <= word_frac;
+      sent_local_max <= word_local_max;
+      if rst = '1' or cancel = '1' then
+        sent <= '0';
+      end if;
+    end if;
+  end process p_beat;
 
-  out_data <= fetched_last & mask & word_plane & word_frac & word_best;
+  empty   <= to_bit(sent_best = 0);
+  mask(0) <= empty and not sent_frac(0);
+  mask(1) <= empty and sent_frac(0) and not sent_frac(1);
+  mask(2) <= to_bit(sent_best < unsigned(threshold)) and not (empty and not (sent_frac(0) and sent_frac(1)));
+  mask(3) <= not sent_local_max and not (empty and not (sent_frac(0) and sent_frac(1)));
 
-  u_out : entity work.stream_reg
+  out_data <= sent_last & mask & sent_plane & sent_frac & std_logic_vector(sent_best);
+
+  u_out : entity work.stream_fifo
     generic map (
-      G_DATA_W => C_DATA_W + 1
+      G_DATA_W     => C_DATA_W + 1,
+      G_DEPTH_LOG2 => 4
     )
     port map (
       clk      => clk,
       rst      => clear,
-      s_tvalid => fetched,
+      s_tvalid => sent,
       s_tready => out_ready,
       s_tdata  => out_data,
+      few      => few,
+      more     => behind,
       m_tvalid => beat_valid,
       m_tready => m_tready,
       m_tdata  => beat
@@ -576,7 +585,7 @@ begin
   m_tvalid    <= beat_valid;
   m_tlast     <= beat(C_DATA_W);
   m_tdata     <= beat(C_DATA_W - 1 downto 0);
-  unload_more <= unloading or read or fetched;
+  unload_more <= unloading or read or fetched or sent or behind;
   unload_done <= beat_valid and m_tready and beat(C_DATA_W);
 
   -- synthesis translate_off
@@ -595,7 +604,7 @@ begin
       assert unload /= '1' or v_way = '0'
         report "updating: unloading begins while cells are on their way to the map"
         severity failure;
-      assert s_valid(0) /= '1' or (unloading or read or fetched) = '0'
+      assert s_valid(0) /= '1' or (unloading or read or fetched or sent) = '0'
         report "updating: a cell comes while the map is unloaded"
         severity failure;
       assert s2_valid /= '1' or s2_first = '1' or not is_x(word)
@@ -603,6 +612,9 @@ begin
         severity failure;
       assert fetched /= '1' or not is_x(word)
         report "updating: a cell that leaves is unknown"
+        severity failure;
+      assert sent /= '1' or out_ready = '1'
+        report "updating: a cell that leaves finds no place"
         severity failure;
       assert way_valid(G_FRAC_W) /= '1' or to_integer(write_cell) < G_CELLS
         report "updating: more cells than the map has"

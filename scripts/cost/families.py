@@ -43,10 +43,37 @@ def commands(family, top, no_dsp, work):
     if family in ("xc6v", "xc5v"):
         return [f"synth_xilinx -family {family} -flatten -noiopad {'-nodsp' if no_dsp else ''} -top {top}"]
     if family == "ecp5":
-        return [f"synth_ecp5 {'-nodsp' if no_dsp else ''} -top {top}"]
+        return ecp5_commands(top, no_dsp, work)
     if family == "ng_medium":
         return nx_commands(top, no_dsp, work)
     raise ValueError(f"unknown family '{family}': " + ", ".join(FAMILIES))
+
+
+# Blocks of ECP5 for memories of more than 2048 words, as Yosys' share/lattice/brams_16kd.txt has them, but in widths of
+# 1, 2 and 4 only. With the ninth bits Yosys saves one block of nine and puts a multiplexer of up to 16 inputs behind
+# blocks that take most of a clock by themselves.
+ECP5_DEEP = """
+ram block $__DP16KD_ {
+  abits 14; widths 1 2 4 per_port; cost 128; init no_undef;
+  port srsw "A" "B" {
+    clock anyedge; clken;
+    portoption "WRITEMODE" "NORMAL" { rdwr no_change; }
+    portoption "WRITEMODE" "WRITETHROUGH" { rdwr new; }
+    portoption "WRITEMODE" "READBEFOREWRITE" { rdwr old; }
+    option "RESETMODE" "SYNC" { rdsrst zero ungated block_wr; }
+    option "RESETMODE" "ASYNC" { rdarst zero; }
+    rdinit zero;
+  }
+}
+"""
+
+
+def ecp5_commands(top, no_dsp, work):
+    """The same for ECP5."""
+    (work / "ecp5_deep.txt").write_text(ECP5_DEEP)
+    synth = f"synth_ecp5 {'-nodsp' if no_dsp else ''} -top {top}"
+    return [f"{synth} -run begin:map_ram", f"memory_libmap -lib {work}/ecp5_deep.txt t:$mem_v2 r:SIZE>2048 %i",
+            f"{synth} -run map_ram:"]
 
 
 def nx_commands(top, no_dsp, work):
@@ -69,8 +96,9 @@ def nx_commands(top, no_dsp, work):
 
 def fingerprint(family):
     """All that is particular to a family, as text: a kept result is good only as long as this does not change."""
-    nx = (inspect.getsource(nx_commands), NX_MUL_MAP, NX_RFB_DECLARED, NX_MUL_TECHMAP)
-    return repr((inspect.getsource(commands), KINDS[STYLE[family]], nx if family == "ng_medium" else ()))
+    own = {"ng_medium": (inspect.getsource(nx_commands), NX_MUL_MAP, NX_RFB_DECLARED, NX_MUL_TECHMAP),
+           "ecp5": (inspect.getsource(ecp5_commands), ECP5_DEEP)}
+    return repr((inspect.getsource(commands), KINDS[STYLE[family]], own.get(family, ())))
 
 
 # Kind of a cell, by the first pattern that matches; how many LUTs one of them takes.

@@ -31,6 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
+import families  # noqa: E402
 import measure as cost  # noqa: E402
 
 DEVICE = ["--85k", "--speed", "8", "--package", "CABGA756"]
@@ -171,6 +172,7 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
             verilog, top = cost.take_unit(verilog, unit, [f[:-4] for f in cost.all_entities(rtl)])
         text = verilog + harness(verilog, top)
         question = [text, DEVICE, freq, cost.tool_version(), pathlib.Path(__file__).read_text(),
+                    families.fingerprint("ecp5"),
                     (cost.HERE / "requirements.txt").read_text()]
         key = hashlib.sha256(json.dumps(question).encode()).hexdigest()
         cache = pathlib.Path(os.environ.get("COST_CACHE", cost.ROOT / "build" / "cost" / "cache"))
@@ -179,7 +181,8 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
         missing = [seed for seed in seeds if not kept[seed].exists()]
         if missing:
             (work / "top.v").write_text(text)
-            cost.run_yosys([f"read_verilog {work}/top.v", f"synth_ecp5 -top harness -json {work}/top.json"], work)
+            cost.run_yosys([f"read_verilog {work}/top.v"] + families.commands("ecp5", "harness", False, work)
+                           + [f"write_json {work}/top.json"], work)
             netlist = json.loads((work / "top.json").read_text())
             merged = merge_output_registers(netlist)
             (work / "top.json").write_text(json.dumps(netlist))

@@ -25,7 +25,7 @@ while ($text =~ /^module (\w+)\b(.*?)^endmodule/gms) {
 my %instances = (psweep => 1);
 $instances{$_->[1]} += $instances{$_->[0]} // 0 for @uses;
 my @names = sort { length $b <=> length $a } qw(control address_generator storage interpolation similarity updating
-  divider delay_line stream_reg ram_sdp ram_2r psweep);
+  divider delay_line stream_fifo ram_sdp ram_2r psweep);
 
 my (@list, $count);
 $text =~ s{^(module (\w+)\b.*?^endmodule)}{edit($2, $1)}gmse;
@@ -34,7 +34,7 @@ sub edit {
   my ($entity) = grep { $module =~ /^\Q$_\E(_\d|$)/ } @names;
   return $body if !defined $entity || $module eq 'psweep' || ($instances{$module} // 0) != 1;
   # Common cells are known by what they are in their only instance.
-  my $where = $entity =~ /^(divider|delay_line|stream_reg|ram_)/ ? "$instance{$module}." : '';
+  my $where = $entity =~ /^(divider|delay_line|stream_fifo|ram_)/ ? "$instance{$module}." : '';
   # Signals of the VHDL by the register behind them.
   my %name;
   while ($body =~ /assign (\w+) = (n\d+_q);/g) { $name{$2} = $1 if !$name{$2} || $name{$2} =~ /^\w+_q$/ }

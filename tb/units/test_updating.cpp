@@ -147,7 +147,7 @@ struct Bench : Agent {
     const uint64_t begin = sim.cycle();
     sim.run_until([&] { return unloads_done == 1 || sim.cycle() > begin + 50 * map.size() + 100; });
     CHECK(unloads_done == 1);
-    if (map_stall == 0) CHECK(sim.cycle() - begin == map.size() + 3);  // three clocks to the first beat, no bubble
+    if (map_stall == 0) CHECK(sim.cycle() - begin == map.size() + 5);  // five clocks to the first beat, no bubble
     ++tile;
   }
   void check() {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// stream_reg with 3 bits, resets at any time, for ever after the first one:
+// stream_fifo with 3 bits, resets at any time, for ever after the first one:
 //   - never more than two words inside, none taken out that was not put in
 //   - word number n out is word number n in, for every n
 //   - a word that is shown stays until it is taken; ready does not fall without a word having come
 module proof(input clk, rst, s_tvalid, m_tready, input [2:0] s_tdata);
   wire s_tready, m_tvalid;
   wire [2:0] m_tdata;
-  stream_reg dut(.clk(clk), .rst(rst), .s_tvalid(s_tvalid), .s_tready(s_tready), .s_tdata(s_tdata),
+  stream_fifo dut(.clk(clk), .rst(rst), .s_tvalid(s_tvalid), .s_tready(s_tready), .s_tdata(s_tdata),
                  .m_tvalid(m_tvalid), .m_tready(m_tready), .m_tdata(m_tdata));
 
   (* anyconst *) wire [2:0] chosen;  // numbers are counted modulo 8, and at most 2 are inside

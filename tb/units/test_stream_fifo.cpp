@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// stream_reg: nothing lost, doubled or reordered under any stall; full rate and one clock of latency without stalls;
-// empty after reset. Also proves that the bench parts themselves notice what they are there for.
+// stream_fifo: nothing lost, doubled or reordered under any stall; full rate and two clocks of latency without stalls;
+// all places used, 'few' and 'more' right, empty after reset. Also proves that the bench parts themselves notice what they are there for.
+#include <deque>
 #include <random>
 
-#include "Vstream_reg.h"
+#include "Vstream_fifo.h"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/stream.hpp"
@@ -16,15 +17,15 @@ namespace {
 constexpr int kDataBits = 12;
 
 struct Bench {
-  Sim<Vstream_reg> sim;
-  Scoreboard board{"stream_reg"};
-  Vstream_reg& dut = sim.dut();
+  Sim<Vstream_fifo> sim;
+  Scoreboard board{"stream_fifo"};
+  Vstream_fifo& dut = sim.dut();
   decltype(stream_ports(&dut.s_tvalid, &dut.s_tready, &dut.s_tdata)) in =
       stream_ports(&dut.s_tvalid, &dut.s_tready, &dut.s_tdata);
   decltype(stream_ports(&dut.m_tvalid, &dut.m_tready, &dut.m_tdata)) out =
       stream_ports(&dut.m_tvalid, &dut.m_tready, &dut.m_tdata);
-  StreamDriver<Vstream_reg, decltype(in)> driver;
-  StreamMonitor<Vstream_reg, decltype(out)> monitor;
+  StreamDriver<Vstream_fifo, decltype(in)> driver;
+  StreamMonitor<Vstream_fifo, decltype(out)> monitor;
 
   Bench(uint32_t seed, double in_stall, double out_stall)
       : sim(200000, seed),
@@ -38,7 +39,7 @@ struct Bench {
 
 }  // namespace
 
-TEST_CASE("stream_reg: order, completeness and protocol under stalls") {
+TEST_CASE("stream_fifo: order, completeness and protocol under stalls") {
   const double in_stall = GENERATE(0.0, 0.3, 0.8);
   const double out_stall = GENERATE(0.0, 0.3, 0.8);
   const uint32_t seed = test_seed();
@@ -56,22 +57,30 @@ TEST_CASE("stream_reg: order, completeness and protocol under stalls") {
   CHECK(bench.board.ok());
   CHECK(bench.board.compared() == kBeats);
   CHECK(bench.monitor.protocol_errors() == 0);
-  if (in_stall == 0 && out_stall == 0) CHECK(bench.sim.cycle() == kBeats + 1);
+  if (in_stall == 0 && out_stall == 0) CHECK(bench.sim.cycle() == kBeats + 2);
 }
 
-TEST_CASE("stream_reg: empty after reset, whatever was inside") {
+TEST_CASE("stream_fifo: empty after reset, whatever was inside") {
   Bench bench(test_seed(), 0, 1.0);  // the receiver takes nothing
-  bench.driver.push(1);
-  bench.driver.push(2);
-  bench.driver.push(3);
+  for (uint64_t i = 0; i < 20; ++i) bench.driver.push(i);
+  for (uint64_t taken = 0; taken < 15; ++taken) {
+    CHECK(bench.dut.s_tready == 1);
+    CHECK(bench.dut.few == (taken <= 8));  // of a clock ago
+    CHECK(bench.dut.more == (taken >= 2 || (taken == 1 && !bench.dut.m_tvalid)));
+    bench.sim.tick();
+  }
   bench.sim.run(10);
-  REQUIRE(bench.driver.sent() == 2);  // both places full
+  REQUIRE(bench.driver.sent() == 15);  // all places full
+  CHECK(bench.dut.s_tready == 0);
+  CHECK(bench.dut.few == 0);
   bench.driver.clear();
   bench.monitor.set_watching(false);
   bench.sim.reset();
   bench.monitor.set_watching(true);
   CHECK(bench.dut.m_tvalid == 0);
   CHECK(bench.dut.s_tready == 1);
+  CHECK(bench.dut.few == 1);
+  CHECK(bench.dut.more == 0);
   bench.monitor.set_stall(0);
   bench.driver.push(4);
   bench.board.expect(4);
@@ -79,6 +88,45 @@ TEST_CASE("stream_reg: empty after reset, whatever was inside") {
   bench.sim.run(5);
   INFO(bench.board.report());
   CHECK(bench.board.ok());
+}
+
+TEST_CASE("stream_fifo: a sender that looks at 'few' alone loses nothing six clocks later") {
+  const double out_stall = GENERATE(0.0, 0.3, 0.9);
+  const uint32_t seed = test_seed();
+  INFO("seed " << seed << " stalls " << out_stall);
+  Sim<Vstream_fifo> sim(200000, seed);
+  Vstream_fifo& dut = sim.dut();
+  Scoreboard board{"stream_fifo"};
+  auto out = stream_ports(&dut.m_tvalid, &dut.m_tready, &dut.m_tdata);
+  StreamMonitor<Vstream_fifo, decltype(out)> monitor(sim, out, seed, out_stall,
+                                                     [&](const Beat& b) { board.observe(b.data, b.clock); });
+  // Begun while few = '1', put in six clocks later.
+  struct Sender : Agent {
+    Vstream_fifo& dut;
+    Scoreboard& board;
+    std::deque<bool> way = std::deque<bool>(6, false);
+    uint64_t sent = 0, refused = 0;
+    Sender(Vstream_fifo& d, Scoreboard& b) : dut(d), board(b) { dut.s_tvalid = 0; }
+    void drive() override {
+      dut.s_tvalid = way.front();
+      dut.s_tdata = sent & 0xfff;
+    }
+    void sample() override {
+      way.pop_front();
+      way.push_back(dut.few && sent < 3000);
+      if (!dut.s_tvalid) return;
+      refused += !dut.s_tready;
+      board.expect(sent++ & 0xfff);
+    }
+  } sender(dut, board);
+  sim.add(sender);
+  sim.add(monitor);
+  sim.reset();
+  sim.run_until([&] { return sender.sent >= 3000 && board.outstanding() == 0; });
+  INFO(board.report());
+  CHECK(board.ok());
+  CHECK(sender.refused == 0);
+  CHECK(monitor.protocol_errors() == 0);
 }
 
 TEST_CASE("bench parts: a scoreboard that compared nothing, or misses a value, is not ok") {
@@ -114,7 +162,7 @@ TEST_CASE("bench parts: a run that never ends throws, a source that breaks the p
   CData valid = 1, ready = 0;
   IData data = 1;
   auto ports = stream_ports(&valid, &ready, &data);
-  StreamMonitor<Vstream_reg, decltype(ports)> monitor(bench.sim, ports, 1, 1.0, [](const Beat&) {});
+  StreamMonitor<Vstream_fifo, decltype(ports)> monitor(bench.sim, ports, 1, 1.0, [](const Beat&) {});
   monitor.drive(), monitor.sample();
   monitor.drive(), monitor.sample();
   CHECK(monitor.protocol_errors() == 0);
