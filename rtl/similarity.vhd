@@ -64,9 +64,15 @@ architecture rtl of similarity is
   -- denominator, at most n^2 2^(2 G_SAMPLE_W - 1): what leads to them is needed modulo 2^C_DEN_W only.
   constant C_CL_W  : integer := G_SAMPLE_W + C_GROW;
   constant C_CX_W  : integer := 2 * G_SAMPLE_W - 1 + C_GROW;
-  constant C_C_W   : integer := 2 * C_CL_W + 2 * C_CX_W;
+  constant C_XY_W  : integer := 2 * C_CX_W;
   constant C_SL_W  : integer := G_SAMPLE_W + C_NGROW;
   constant C_DEN_W : integer := 2 * G_SAMPLE_W - 1 + clog2(C_N * C_N);
+
+  -- Words of the column RAM are two bits shorter than the sums (kept, below); one with 15 rows, whose sum of y comes
+  -- too near to the end of its range, and where x has less than 4 bits.
+  constant C_FOLD   : boolean := 8 * G_WINDOW <= 7 * 2 ** C_GROW and C_CX_W >= 4;
+  constant C_KEPT_W : integer := C_XY_W - 1 - boolean'pos(C_FOLD); -- of x and y
+  constant C_C_W    : integer := C_KEPT_W + 2 * C_CL_W;
 
   -- Delay of M rows: one circular buffer, begun anew when M rows have been written, so that it fits any row length.
   constant C_LINE_DEPTH : integer := G_WINDOW * G_MAX_COLS;
@@ -144,6 +150,7 @@ architecture rtl of similarity is
   signal s7_cr    : signed(C_CL_W - 1 downto 0);
   signal s7_cx    : signed(C_CX_W - 1 downto 0);
   signal s7_cy    : signed(C_CX_W - 1 downto 0);
+  signal s7_xy     : std_logic_vector(C_XY_W - 1 downto 0);
   signal s7_column : std_logic_vector(C_C_W - 1 downto 0);
 
   -- Columns that leave the window, M columns back. Sums of l' and r' go ahead of those of x and y by one clock.
@@ -151,7 +158,7 @@ architecture rtl of similarity is
   signal s6_lr      : std_logic_vector(2 * C_CL_W - 1 downto 0);
   signal s6_lr_left : std_logic_vector(2 * C_CL_W - 1 downto 0);
   signal s7_wide    : std_logic;
-  signal s7_xy_left : std_logic_vector(2 * C_CX_W - 1 downto 0);
+  signal s7_xy_left : std_logic_vector(C_XY_W - 1 downto 0);
   signal s7_flags   : std_logic_vector(1 downto 0);
 
   -- s7, s8: new column - column that leaves; the other way round for x and y, because a constant factor below 0 would
@@ -258,6 +265,54 @@ architecture rtl of similarity is
     v_wide := resize(number, v_wide'length);
     return v_wide(width - 1 downto 0);
   end function fit;
+
+  -- What the column RAM keeps of a column's sums of y and x. Bit 0 of y is left out: squares are odd where l' and r'
+  -- are, so it follows from their sums. Of t, the upper 3 bits of y, and u, the upper 4 of x, one bit is left out:
+  -- 2 |x| <= y says that -t-1 <= u <= t, so that rows t and 6-t of a table of u have 16 places together. Rows 0, 1, 2
+  -- take those that rows 6, 5, 4 leave free: kept are the number of the pair of rows, and u with its sign inverted in
+  -- rows 0, 1, 2. t = 7 is the largest y of 7 rows, all samples at the low end: u = 7, which row 3 leaves free.
+  constant C_T : integer := C_XY_W - 4; -- place of t where bit 0 of y is left out, of u
+  constant C_U : integer := C_CX_W - 4;
+
+  function kept (y, x : signed) return std_logic_vector is
+    variable v_xy    : std_logic_vector(C_XY_W - 2 downto 0);
+    variable v_lower : std_logic; -- t < 3
+  begin
+    v_xy := std_logic_vector(y(C_CX_W - 1 downto 1)) & std_logic_vector(x);
+    if C_FOLD then
+      v_lower       := not (v_xy(C_T + 2) or (v_xy(C_T + 1) and v_xy(C_T)));
+      v_xy(C_T + 1) := v_xy(C_T + 1) xor (v_xy(C_T + 2) and not v_xy(C_T));
+      v_xy(C_U + 3) := v_xy(C_U + 3) xor v_lower;
+    end if;
+    return v_xy(C_KEPT_W - 1 downto 0);
+  end function kept;
+
+  -- The reverse: y and x.
+  function restored (word : std_logic_vector; odd : std_logic) return std_logic_vector is
+    variable v_xy   : std_logic_vector(C_XY_W - 2 downto 0);
+    variable v_pair : unsigned(1 downto 0);
+    variable v_size : unsigned(2 downto 0); -- u, or -1-u where it is below 0
+  begin
+    v_xy                        := (others => '0');
+    v_xy(C_KEPT_W - 1 downto 0) := word;
+    if C_FOLD then
+      v_pair := unsigned(v_xy(C_T + 1 downto C_T));
+      v_size := unsigned(v_xy(C_U + 2 downto C_U));
+      if v_xy(C_U + 3) = '1' then
+        v_size := not v_size;
+      end if;
+      if resize(v_size, 4) + resize(v_pair, 4) < 7 then
+        -- Row 6, 5, 4 or 3.
+        v_xy(C_T + 2) := not (v_pair(1) and v_pair(0));
+        v_xy(C_T + 1) := v_pair(1) xnor v_pair(0);
+      else
+        -- Row 0, 1, 2 or 7.
+        v_xy(C_T + 2) := v_pair(1) and v_pair(0);
+        v_xy(C_U + 3) := v_xy(C_U + 3) xnor v_xy(C_T + 2);
+      end if;
+    end if;
+    return v_xy(C_XY_W - 2 downto C_CX_W) & odd & v_xy(C_CX_W - 1 downto 0);
+  end function restored;
 
 begin
 
@@ -438,14 +493,14 @@ begin
     generic map (
       G_DATA_W  => C_C_W,
       G_DEPTH   => G_MAX_COLS,
-      G_LATENCY => 1
+      G_LATENCY => 2
     )
     port map (
       clk   => clk,
       we    => s7_valid,
       waddr => s7_col,
       wdata => s7_column,
-      raddr => s3_col,
+      raddr => s2_col,
       rdata => s4_column
     );
 
@@ -456,6 +511,7 @@ begin
     variable v_r_old : signed(G_SAMPLE_W - 1 downto 0);
     variable v_cl    : signed(C_CL_W - 1 downto 0);
     variable v_cr    : signed(C_CL_W - 1 downto 0);
+    variable v_xy    : std_logic_vector(C_XY_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       -- s3
@@ -492,14 +548,14 @@ begin
       s5_ab    <= fit(s4_b * s4_a, 2 * G_SAMPLE_W + 1);
       v_cl     := signed(s4_column(C_CL_W - 1 downto 0));
       v_cr     := signed(s4_column(2 * C_CL_W - 1 downto C_CL_W));
-      s5_cx    <= signed(s4_column(2 * C_CL_W + C_CX_W - 1 downto 2 * C_CL_W));
-      s5_cy    <= signed(s4_column(C_C_W - 1 downto 2 * C_CL_W + C_CX_W));
+      v_xy     := restored(s4_column(C_C_W - 1 downto 2 * C_CL_W), v_cl(0) xor v_cr(0));
       if s4_first = '1' then
-        v_cl  := (others => '0');
-        v_cr  := (others => '0');
-        s5_cx <= (others => '0');
-        s5_cy <= (others => '0');
+        v_cl := (others => '0');
+        v_cr := (others => '0');
+        v_xy := (others => '0');
       end if;
+      s5_cx <= signed(v_xy(C_CX_W - 1 downto 0));
+      s5_cy <= signed(v_xy(C_XY_W - 1 downto C_CX_W));
       s5_cl <= v_cl + resize(s4_a, C_CL_W);
       s5_cr <= v_cr + resize(s4_c, C_CL_W);
       -- s6
@@ -526,7 +582,8 @@ begin
     end if;
   end process p_columns;
 
-  s7_column <= std_logic_vector(s7_cy) & std_logic_vector(s7_cx) & std_logic_vector(s7_cr) & std_logic_vector(s7_cl);
+  s7_xy     <= std_logic_vector(s7_cy) & std_logic_vector(s7_cx);
+  s7_column <= kept(s7_cy, s7_cx) & std_logic_vector(s7_cr) & std_logic_vector(s7_cl);
 
   -- s7 - s10: window sums ---------------------------------------------------------------------------------------------
   s6_lr <= std_logic_vector(s6_cr) & std_logic_vector(s6_cl);
@@ -551,13 +608,13 @@ begin
     port map (
       clk    => clk,
       ce     => s7_valid,
-      s_data => s7_column(C_C_W - 1 downto 2 * C_CL_W),
+      s_data => s7_xy,
       m_data => s7_xy_left
     );
 
   p_window : process (clk)
     variable v_lr : std_logic_vector(2 * C_CL_W - 1 downto 0);
-    variable v_xy : std_logic_vector(2 * C_CX_W - 1 downto 0);
+    variable v_xy : std_logic_vector(C_XY_W - 1 downto 0);
     variable v_l  : signed(C_SL_W - 1 downto 0);
     variable v_r  : signed(C_SL_W - 1 downto 0);
     variable v_x  : signed(C_DEN_W - 1 downto 0);
@@ -580,7 +637,7 @@ begin
         v_xy := (others => '0');
       end if;
       s8_dx <= resize(signed(v_xy(C_CX_W - 1 downto 0)), C_CX_W + 1) - resize(s7_cx, C_CX_W + 1);
-      s8_dy <= signed('0' & v_xy(2 * C_CX_W - 1 downto C_CX_W)) - signed('0' & s7_cy);
+      s8_dy <= signed('0' & v_xy(C_XY_W - 1 downto C_CX_W)) - signed('0' & s7_cy);
       if s7_valid = '1' then
         v_l := s8_l;
         v_r := s8_r;
