@@ -4,6 +4,7 @@ psweep_pkg.vhd
 ram_sdp.vhd
 ram_2r.vhd
 ram_deep.vhd
+ram_wide.vhd
 stream_reg.vhd
 control.vhd
 address_generator.vhd

@@ -77,6 +77,8 @@ architecture rtl of similarity is
   -- Delay of M rows: one circular buffer, begun anew when M rows have been written, so that it fits any row length.
   constant C_LINE_DEPTH : integer := G_WINDOW * G_MAX_COLS;
 
+  signal next_line : unsigned(clog2(C_LINE_DEPTH) - 1 downto 0); -- s1_line of the next clock
+
   -- s1: counters; each describes the sample in s1
   signal s1_valid       : std_logic;
   signal s1_row_first   : std_logic;
@@ -330,6 +332,17 @@ begin
     severity failure;
 
   -- s1 ---------------------------------------------------------------------------------------------------------------
+  p_next_line : process (s_valid, s_row_first, s_plane_first, s1_slot, s1_line)
+  begin
+    next_line <= s1_line;
+    if s_valid = '1' then
+      next_line <= s1_line + 1;
+      if s_row_first = '1' and (s_plane_first = '1' or s1_slot = G_WINDOW - 1) then
+        next_line <= (others => '0');
+      end if;
+    end if;
+  end process p_next_line;
+
   p_count : process (clk)
   begin
     if rising_edge(clk) then
@@ -339,6 +352,7 @@ begin
       s1_plane_last  <= s_plane_last;
       s1_l           <= s_l;
       s1_r           <= s_r;
+      s1_line        <= next_line;
       if s_valid = '1' then
         s1_run_x <= next_run(s1_run_x, s_usable_x, s_row_first);
         if s_row_first = '1' then
@@ -347,19 +361,15 @@ begin
           s1_run_y  <= next_run(s1_run_y, s_usable_y, s_plane_first);
           if s_plane_first = '1' then
             s1_slot <= (others => '0');
-            s1_line <= (others => '0');
             s1_warm <= '0';
           elsif s1_slot = G_WINDOW - 1 then
             s1_slot <= (others => '0');
-            s1_line <= (others => '0');
             s1_warm <= '1';
           else
             s1_slot <= s1_slot + 1;
-            s1_line <= s1_line + 1;
           end if;
         else
-          s1_col  <= s1_col + 1;
-          s1_line <= s1_line + 1;
+          s1_col <= s1_col + 1;
           if s1_wide = '0' then
             s1_before <= s1_before + 1;
           end if;
@@ -443,21 +453,21 @@ begin
     );
 
   -- s2: delay of M rows ----------------------------------------------------------------------------------------------
-  -- A word is read one clock before it is replaced: the buffer holds exactly M rows.
+  -- A word is read two clocks before it is replaced: the buffer holds exactly M rows.
   s2_write <= s2_r & s2_l;
 
-  u_lines : entity work.ram_sdp
+  u_lines : entity work.ram_wide
     generic map (
       G_DATA_W  => 2 * G_SAMPLE_W,
       G_DEPTH   => C_LINE_DEPTH,
-      G_LATENCY => 1
+      G_LATENCY => 2
     )
     port map (
       clk   => clk,
       we    => s2_valid,
       waddr => s2_line,
       wdata => s2_write,
-      raddr => std_logic_vector(s1_line),
+      raddr => std_logic_vector(next_line),
       rdata => s2_old
     );
 

@@ -81,8 +81,8 @@ struct Bench : Agent {
       case Texture::kLow:
         return {0, top};
       case Texture::kColumns: {
-        // The column decides how many samples lie at the ends of the range and in how many of them l and r are opposite,
-        // so that its sums reach the corners of what they may be.
+        // The column decides how many samples lie at the ends of the range and in how many of them l and r are
+        // opposite, so that its sums reach the corners of what they may be.
         const int a = i / 32 % 2 && below(2) ? top : 0, b = below(7) < i % 8 ? top - a : a;
         return below(4) <= i / 8 % 4 ? std::pair{a, b} : std::pair{top / 2, top / 2};
       }
@@ -155,9 +155,9 @@ template <class Dut>
 void run_window(int window, int sample_bits, int mncc_bits, int max_cols) {
   INFO("seed " << test_seed() << " window " << window);
   Bench<Dut> bench(window, sample_bits, mncc_bits);
-  for (const Texture kind : {Texture::kRandom, Texture::kEqual, Texture::kConstant, Texture::kMaximum,
-                             Texture::kChecker, Texture::kOpposite, Texture::kFaint, Texture::kLow,
-                             Texture::kColumns}) {
+  for (const Texture kind :
+       {Texture::kRandom, Texture::kEqual, Texture::kConstant, Texture::kMaximum, Texture::kChecker, Texture::kOpposite,
+        Texture::kFaint, Texture::kLow, Texture::kColumns}) {
     bench.run_plane(kind, window, window, 0);  // one cell
     bench.run_plane(kind, window + bench.below(max_cols - window + 1), window + bench.below(window), 0);
     bench.run_plane(kind, max_cols, 2 * window + 3, 0.02);
