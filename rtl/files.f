@@ -12,6 +12,7 @@ storage.vhd
 interpolation.vhd
 delay_line.vhd
 divider.vhd
+divider_mul.vhd
 similarity.vhd
 updating.vhd
 psweep.vhd

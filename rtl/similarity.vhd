@@ -7,6 +7,7 @@
 --             new sample changes them by new - old: with a = l' - l'old and c = r' - r'old, dx = a r' + l'old c and
 --             dy = a (l' + l'old) + c (r' + r'old). Window sums follow from column sums likewise, as running sums.
 --             Nothing grows with M but RAM depth.
+--   Divider : G_DIVIDER = 0 is divider, one bit a stage; 1 is divider_mul, three products. Same results and latency
 --   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
 --             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
@@ -29,7 +30,8 @@ entity similarity is
     G_WINDOW   : integer := 13;
     G_SAMPLE_W : integer := 10;
     G_MNCC_W   : integer := 13;
-    G_MAX_COLS : integer := 268
+    G_MAX_COLS : integer := 268;
+    G_DIVIDER  : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -212,11 +214,11 @@ architecture rtl of similarity is
   signal s14_den      : unsigned(C_NORM + 2 downto 0);
   signal s15_valid    : std_logic;
   signal s15_num      : unsigned(C_NORM - 1 downto 0);
+  signal s15_kept     : unsigned(C_NORM - 1 downto 0); -- den, inverted for divider_mul
   signal s15_den      : unsigned(C_NORM - 1 downto 0);
 
   -- Division and what waits for it.
   signal div_valid    : std_logic_vector(G_MNCC_W downto 0);
-  signal div_num      : std_logic_vector(C_NORM downto 0);
   signal div_quot     : std_logic_vector(G_MNCC_W - 1 downto 0);
   signal div_textured : std_logic_vector(0 downto 0);
   signal flags_out    : std_logic_vector(1 downto 0);
@@ -326,6 +328,9 @@ begin
     severity failure;
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
     report "similarity: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    severity failure;
+  assert G_DIVIDER = 0 or G_DIVIDER = 1
+    report "similarity: G_DIVIDER=" & integer'image(G_DIVIDER) & " is neither 0 nor 1"
     severity failure;
   assert G_MAX_COLS >= G_WINDOW and G_MAX_COLS <= 4096
     report "similarity: G_MAX_COLS=" & integer'image(G_MAX_COLS) & " outside G_WINDOW..4096"
@@ -716,6 +721,7 @@ begin
     variable v_den     : unsigned(63 downto 0);
     variable v_low_num : unsigned(63 downto 0); -- the low half, and zeros that a shift by 48 moves in
     variable v_low_den : unsigned(63 downto 0);
+    variable v_s15_den : unsigned(C_NORM - 1 downto 0);
   begin
     if rising_edge(clk) then
       -- s13
@@ -759,17 +765,21 @@ begin
       -- s15
       s15_valid <= s14_valid;
       if s14_den(C_NORM + 2) = '1' then
-        s15_num <= s14_num(C_NORM + 2 downto 3);
-        s15_den <= s14_den(C_NORM + 2 downto 3);
+        s15_num   <= s14_num(C_NORM + 2 downto 3);
+        v_s15_den := s14_den(C_NORM + 2 downto 3);
       elsif s14_den(C_NORM + 1) = '1' then
-        s15_num <= s14_num(C_NORM + 1 downto 2);
-        s15_den <= s14_den(C_NORM + 1 downto 2);
+        s15_num   <= s14_num(C_NORM + 1 downto 2);
+        v_s15_den := s14_den(C_NORM + 1 downto 2);
       elsif s14_den(C_NORM) = '1' then
-        s15_num <= s14_num(C_NORM downto 1);
-        s15_den <= s14_den(C_NORM downto 1);
+        s15_num   <= s14_num(C_NORM downto 1);
+        v_s15_den := s14_den(C_NORM downto 1);
       else
-        s15_num <= s14_num(C_NORM - 1 downto 0);
-        s15_den <= s14_den(C_NORM - 1 downto 0);
+        s15_num   <= s14_num(C_NORM - 1 downto 0);
+        v_s15_den := s14_den(C_NORM - 1 downto 0);
+      end if;
+      s15_kept <= v_s15_den;
+      if G_DIVIDER = 1 then
+        s15_kept <= not v_s15_den;
       end if;
       if rst = '1' then
         s13_valid <= '0';
@@ -779,20 +789,47 @@ begin
     end if;
   end process p_normalise;
 
-  -- Division ---------------------------------------------------------------------------------------------------------
-  div_num <= '0' & std_logic_vector(s15_num);
+  s15_den <= s15_kept when G_DIVIDER = 0 else not s15_kept;
 
-  u_divider : entity work.divider
-    generic map (
-      G_NUM_W  => C_NORM,
-      G_QUOT_W => G_MNCC_W
-    )
-    port map (
-      clk    => clk,
-      s_num  => div_num,
-      s_den  => std_logic_vector(s15_den),
-      m_quot => div_quot
-    );
+  -- Division ---------------------------------------------------------------------------------------------------------
+  g_steps : if G_DIVIDER = 0 generate
+    signal num : std_logic_vector(C_NORM downto 0);
+  begin
+
+    num <= '0' & std_logic_vector(s15_num);
+
+    u_divider : entity work.divider
+      generic map (
+        G_NUM_W  => C_NORM,
+        G_QUOT_W => G_MNCC_W
+      )
+      port map (
+        clk    => clk,
+        s_num  => num,
+        s_den  => std_logic_vector(s15_den),
+        m_quot => div_quot
+      );
+
+  end generate g_steps;
+
+  g_products : if G_DIVIDER /= 0 generate
+    signal nden : std_logic_vector(C_NORM - 1 downto 0);
+  begin
+
+    nden <= not std_logic_vector(s15_den);
+
+    u_divider : entity work.divider_mul
+      generic map (
+        G_QUOT_W => G_MNCC_W
+      )
+      port map (
+        clk    => clk,
+        s_num  => std_logic_vector(s15_num),
+        s_nden => nden,
+        m_quot => div_quot
+      );
+
+  end generate g_products;
 
   u_textured : entity work.delay_line
     generic map (

@@ -46,7 +46,7 @@ between() { # between NAME LOW HIGH
 }
 primes=(2 3 5 7 11 13 17 19 23 29 31 37)
 names=() wanted=()
-window=0 cols=0 rows=0 planes=0 lanes=0 pix=0 weight=0 interp=0 mncc=0 frac=0 rectified=0 disparity=0 prime=0
+window=0 cols=0 rows=0 planes=0 lanes=0 pix=0 weight=0 interp=0 mncc=0 frac=0 rectified=0 divider=0 disparity=0 prime=0
 # Drawn in this shell, one after the other, so that --only finds the same.
 for ((k = 1; k <= count; k++)); do
   pick window 3 5 7 9 11 13 15 17 19 21
@@ -60,6 +60,7 @@ for ((k = 1; k <= count; k++)); do
   between mncc 4 16
   between frac 2 12
   pick rectified 0 0 1
+  pick divider 0 1
   between disparity 0 12
   pick prime 0 1
   if [ "$prime" -eq 1 ]; then
@@ -77,7 +78,8 @@ for ((k = 1; k <= count; k++)); do
   if [ "$interp" -gt 8 ]; then interp=8; fi
   name=s${seed}_$k
   args="PLANE_COLS=$cols PLANE_ROWS=$rows PLANES=$planes WINDOW=$window PIX_BITS=$pix WEIGHT_BITS=$weight"
-  args+=" INTERP_FRAC=$interp MNCC_BITS=$mncc FRAC_BITS=$frac LANES=$lanes RECTIFIED=$rectified DISPARITY=$disparity"
+  args+=" INTERP_FRAC=$interp MNCC_BITS=$mncc FRAC_BITS=$frac LANES=$lanes RECTIFIED=$rectified DIVIDER=$divider"
+  args+=" DISPARITY=$disparity"
   if [ -n "$only" ] && [ "$only" -ne "$k" ]; then continue; fi
   mapfile -t defines < <(tr ' ' '\n' <<< "$args" | sed 's/^/-D/')
   cmake -D DIR="$out/configs" -D NAME="$name" -D WAVES=1 "${defines[@]}" -P scripts/make_config.cmake \
