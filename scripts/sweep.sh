@@ -60,13 +60,13 @@ for ((k = 1; k <= count; k++)); do
   between mncc 4 16
   between frac 2 12
   pick rectified 0 0 1
-  pick divider 0 1
   between disparity 0 12
   pick prime 0 1
   if [ "$prime" -eq 1 ]; then
     pick cols "${primes[@]}"
     pick rows "${primes[@]}"
   fi
+  pick divider 0 1
   case $k in
     1) window=21 cols=1 rows=1 planes=1 lanes=1 ;;      # one cell, one plane, the largest window
     2) window=3 cols=1 rows=17 planes=2 lanes=4 ;;      # one column, fewer planes than lanes, the smallest window
