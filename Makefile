@@ -10,7 +10,7 @@ export JOBS VERBOSE T SEED SEEDS SETUP STAGE CFG PLANE CELL
 
 # Everything that `make config` passes on to scripts/make_config.cmake.
 CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
-               IMG_COLS IMG_ROWS LANES RECTIFIED DISPARITY WAVES
+               IMG_COLS IMG_ROWS LANES RECTIFIED DIVIDER DISPARITY WAVES
 
 # What the vendor flows take.
 FLOW_OPTIONS = $(if $(BOARD),--board $(BOARD)) $(if $(TOP),--top $(TOP)) $(if $(CFG),--config $(CFG)) $(GENERICS)

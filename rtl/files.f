@@ -4,6 +4,7 @@ psweep_pkg.vhd
 ram_sdp.vhd
 ram_2r.vhd
 ram_deep.vhd
+ram_wide.vhd
 stream_fifo.vhd
 control.vhd
 address_generator.vhd
@@ -11,6 +12,7 @@ storage.vhd
 interpolation.vhd
 delay_line.vhd
 divider.vhd
+divider_mul.vhd
 similarity.vhd
 updating.vhd
 psweep.vhd

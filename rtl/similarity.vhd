@@ -7,6 +7,7 @@
 --             new sample changes them by new - old: with a = l' - l'old and c = r' - r'old, dx = a r' + l'old c and
 --             dy = a (l' + l'old) + c (r' + r'old). Window sums follow from column sums likewise, as running sums.
 --             Nothing grows with M but RAM depth.
+--   Divider : G_DIVIDER = 0 is divider, one bit a stage; 1 is divider_mul, three products. Same results and latency
 --   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
 --             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
@@ -29,7 +30,8 @@ entity similarity is
     G_WINDOW   : integer := 13;
     G_SAMPLE_W : integer := 10;
     G_MNCC_W   : integer := 13;
-    G_MAX_COLS : integer := 268
+    G_MAX_COLS : integer := 268;
+    G_DIVIDER  : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -64,12 +66,20 @@ architecture rtl of similarity is
   -- denominator, at most n^2 2^(2 G_SAMPLE_W - 1): what leads to them is needed modulo 2^C_DEN_W only.
   constant C_CL_W  : integer := G_SAMPLE_W + C_GROW;
   constant C_CX_W  : integer := 2 * G_SAMPLE_W - 1 + C_GROW;
-  constant C_C_W   : integer := 2 * C_CL_W + 2 * C_CX_W;
+  constant C_XY_W  : integer := 2 * C_CX_W;
   constant C_SL_W  : integer := G_SAMPLE_W + C_NGROW;
   constant C_DEN_W : integer := 2 * G_SAMPLE_W - 1 + clog2(C_N * C_N);
 
+  -- Words of the column RAM are two bits shorter than the sums (kept, below); one with 15 rows, whose sum of y comes
+  -- too near to the end of its range, and where x has less than 4 bits.
+  constant C_FOLD   : boolean := 8 * G_WINDOW <= 7 * 2 ** C_GROW and C_CX_W >= 4;
+  constant C_KEPT_W : integer := C_XY_W - 1 - boolean'pos(C_FOLD); -- of x and y
+  constant C_C_W    : integer := C_KEPT_W + 2 * C_CL_W;
+
   -- Delay of M rows: one circular buffer, begun anew when M rows have been written, so that it fits any row length.
   constant C_LINE_DEPTH : integer := G_WINDOW * G_MAX_COLS;
+
+  signal next_line : unsigned(clog2(C_LINE_DEPTH) - 1 downto 0); -- s1_line of the next clock
 
   -- s1: counters; each describes the sample in s1
   signal s1_valid       : std_logic;
@@ -144,6 +154,7 @@ architecture rtl of similarity is
   signal s7_cr    : signed(C_CL_W - 1 downto 0);
   signal s7_cx    : signed(C_CX_W - 1 downto 0);
   signal s7_cy    : signed(C_CX_W - 1 downto 0);
+  signal s7_xy     : std_logic_vector(C_XY_W - 1 downto 0);
   signal s7_column : std_logic_vector(C_C_W - 1 downto 0);
 
   -- Columns that leave the window, M columns back. Sums of l' and r' go ahead of those of x and y by one clock.
@@ -151,7 +162,7 @@ architecture rtl of similarity is
   signal s6_lr      : std_logic_vector(2 * C_CL_W - 1 downto 0);
   signal s6_lr_left : std_logic_vector(2 * C_CL_W - 1 downto 0);
   signal s7_wide    : std_logic;
-  signal s7_xy_left : std_logic_vector(2 * C_CX_W - 1 downto 0);
+  signal s7_xy_left : std_logic_vector(C_XY_W - 1 downto 0);
   signal s7_flags   : std_logic_vector(1 downto 0);
 
   -- s7, s8: new column - column that leaves; the other way round for x and y, because a constant factor below 0 would
@@ -203,11 +214,11 @@ architecture rtl of similarity is
   signal s14_den      : unsigned(C_NORM + 2 downto 0);
   signal s15_valid    : std_logic;
   signal s15_num      : unsigned(C_NORM - 1 downto 0);
+  signal s15_kept     : unsigned(C_NORM - 1 downto 0); -- den, inverted for divider_mul
   signal s15_den      : unsigned(C_NORM - 1 downto 0);
 
   -- Division and what waits for it.
   signal div_valid    : std_logic_vector(G_MNCC_W downto 0);
-  signal div_num      : std_logic_vector(C_NORM downto 0);
   signal div_quot     : std_logic_vector(G_MNCC_W - 1 downto 0);
   signal div_textured : std_logic_vector(0 downto 0);
   signal flags_out    : std_logic_vector(1 downto 0);
@@ -259,6 +270,54 @@ architecture rtl of similarity is
     return v_wide(width - 1 downto 0);
   end function fit;
 
+  -- What the column RAM keeps of a column's sums of y and x. Bit 0 of y is left out: squares are odd where l' and r'
+  -- are, so it follows from their sums. Of t, the upper 3 bits of y, and u, the upper 4 of x, one bit is left out:
+  -- 2 |x| <= y says that -t-1 <= u <= t, so that rows t and 6-t of a table of u have 16 places together. Rows 0, 1, 2
+  -- take those that rows 6, 5, 4 leave free: kept are the number of the pair of rows, and u with its sign inverted in
+  -- rows 0, 1, 2. t = 7 is the largest y of 7 rows, all samples at the low end: u = 7, which row 3 leaves free.
+  constant C_T : integer := C_XY_W - 4; -- place of t where bit 0 of y is left out, of u
+  constant C_U : integer := C_CX_W - 4;
+
+  function kept (y, x : signed) return std_logic_vector is
+    variable v_xy    : std_logic_vector(C_XY_W - 2 downto 0);
+    variable v_lower : std_logic; -- t < 3
+  begin
+    v_xy := std_logic_vector(y(C_CX_W - 1 downto 1)) & std_logic_vector(x);
+    if C_FOLD then
+      v_lower       := not (v_xy(C_T + 2) or (v_xy(C_T + 1) and v_xy(C_T)));
+      v_xy(C_T + 1) := v_xy(C_T + 1) xor (v_xy(C_T + 2) and not v_xy(C_T));
+      v_xy(C_U + 3) := v_xy(C_U + 3) xor v_lower;
+    end if;
+    return v_xy(C_KEPT_W - 1 downto 0);
+  end function kept;
+
+  -- The reverse: y and x.
+  function restored (word : std_logic_vector; odd : std_logic) return std_logic_vector is
+    variable v_xy   : std_logic_vector(C_XY_W - 2 downto 0);
+    variable v_pair : unsigned(1 downto 0);
+    variable v_size : unsigned(2 downto 0); -- u, or -1-u where it is below 0
+  begin
+    v_xy                        := (others => '0');
+    v_xy(C_KEPT_W - 1 downto 0) := word;
+    if C_FOLD then
+      v_pair := unsigned(v_xy(C_T + 1 downto C_T));
+      v_size := unsigned(v_xy(C_U + 2 downto C_U));
+      if v_xy(C_U + 3) = '1' then
+        v_size := not v_size;
+      end if;
+      if resize(v_size, 4) + resize(v_pair, 4) < 7 then
+        -- Row 6, 5, 4 or 3.
+        v_xy(C_T + 2) := not (v_pair(1) and v_pair(0));
+        v_xy(C_T + 1) := v_pair(1) xnor v_pair(0);
+      else
+        -- Row 0, 1, 2 or 7.
+        v_xy(C_T + 2) := v_pair(1) and v_pair(0);
+        v_xy(C_U + 3) := v_xy(C_U + 3) xnor v_xy(C_T + 2);
+      end if;
+    end if;
+    return v_xy(C_XY_W - 2 downto C_CX_W) & odd & v_xy(C_CX_W - 1 downto 0);
+  end function restored;
+
 begin
 
   assert G_WINDOW >= 3 and G_WINDOW <= 21 and G_WINDOW mod 2 = 1
@@ -270,11 +329,25 @@ begin
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
     report "similarity: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
     severity failure;
+  assert G_DIVIDER = 0 or G_DIVIDER = 1
+    report "similarity: G_DIVIDER=" & integer'image(G_DIVIDER) & " is neither 0 nor 1"
+    severity failure;
   assert G_MAX_COLS >= G_WINDOW and G_MAX_COLS <= 4096
     report "similarity: G_MAX_COLS=" & integer'image(G_MAX_COLS) & " outside G_WINDOW..4096"
     severity failure;
 
   -- s1 ---------------------------------------------------------------------------------------------------------------
+  p_next_line : process (s_valid, s_row_first, s_plane_first, s1_slot, s1_line)
+  begin
+    next_line <= s1_line;
+    if s_valid = '1' then
+      next_line <= s1_line + 1;
+      if s_row_first = '1' and (s_plane_first = '1' or s1_slot = G_WINDOW - 1) then
+        next_line <= (others => '0');
+      end if;
+    end if;
+  end process p_next_line;
+
   p_count : process (clk)
   begin
     if rising_edge(clk) then
@@ -284,6 +357,7 @@ begin
       s1_plane_last  <= s_plane_last;
       s1_l           <= s_l;
       s1_r           <= s_r;
+      s1_line        <= next_line;
       if s_valid = '1' then
         s1_run_x <= next_run(s1_run_x, s_usable_x, s_row_first);
         if s_row_first = '1' then
@@ -292,19 +366,15 @@ begin
           s1_run_y  <= next_run(s1_run_y, s_usable_y, s_plane_first);
           if s_plane_first = '1' then
             s1_slot <= (others => '0');
-            s1_line <= (others => '0');
             s1_warm <= '0';
           elsif s1_slot = G_WINDOW - 1 then
             s1_slot <= (others => '0');
-            s1_line <= (others => '0');
             s1_warm <= '1';
           else
             s1_slot <= s1_slot + 1;
-            s1_line <= s1_line + 1;
           end if;
         else
-          s1_col  <= s1_col + 1;
-          s1_line <= s1_line + 1;
+          s1_col <= s1_col + 1;
           if s1_wide = '0' then
             s1_before <= s1_before + 1;
           end if;
@@ -388,21 +458,21 @@ begin
     );
 
   -- s2: delay of M rows ----------------------------------------------------------------------------------------------
-  -- A word is read one clock before it is replaced: the buffer holds exactly M rows.
+  -- A word is read two clocks before it is replaced: the buffer holds exactly M rows.
   s2_write <= s2_r & s2_l;
 
-  u_lines : entity work.ram_sdp
+  u_lines : entity work.ram_wide
     generic map (
       G_DATA_W  => 2 * G_SAMPLE_W,
       G_DEPTH   => C_LINE_DEPTH,
-      G_LATENCY => 1
+      G_LATENCY => 2
     )
     port map (
       clk   => clk,
       we    => s2_valid,
       waddr => s2_line,
       wdata => s2_write,
-      raddr => std_logic_vector(s1_line),
+      raddr => std_logic_vector(next_line),
       rdata => s2_old
     );
 
@@ -438,14 +508,14 @@ begin
     generic map (
       G_DATA_W  => C_C_W,
       G_DEPTH   => G_MAX_COLS,
-      G_LATENCY => 1
+      G_LATENCY => 2
     )
     port map (
       clk   => clk,
       we    => s7_valid,
       waddr => s7_col,
       wdata => s7_column,
-      raddr => s3_col,
+      raddr => s2_col,
       rdata => s4_column
     );
 
@@ -456,6 +526,7 @@ begin
     variable v_r_old : signed(G_SAMPLE_W - 1 downto 0);
     variable v_cl    : signed(C_CL_W - 1 downto 0);
     variable v_cr    : signed(C_CL_W - 1 downto 0);
+    variable v_xy    : std_logic_vector(C_XY_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       -- s3
@@ -492,14 +563,14 @@ begin
       s5_ab    <= fit(s4_b * s4_a, 2 * G_SAMPLE_W + 1);
       v_cl     := signed(s4_column(C_CL_W - 1 downto 0));
       v_cr     := signed(s4_column(2 * C_CL_W - 1 downto C_CL_W));
-      s5_cx    <= signed(s4_column(2 * C_CL_W + C_CX_W - 1 downto 2 * C_CL_W));
-      s5_cy    <= signed(s4_column(C_C_W - 1 downto 2 * C_CL_W + C_CX_W));
+      v_xy     := restored(s4_column(C_C_W - 1 downto 2 * C_CL_W), v_cl(0) xor v_cr(0));
       if s4_first = '1' then
-        v_cl  := (others => '0');
-        v_cr  := (others => '0');
-        s5_cx <= (others => '0');
-        s5_cy <= (others => '0');
+        v_cl := (others => '0');
+        v_cr := (others => '0');
+        v_xy := (others => '0');
       end if;
+      s5_cx <= signed(v_xy(C_CX_W - 1 downto 0));
+      s5_cy <= signed(v_xy(C_XY_W - 1 downto C_CX_W));
       s5_cl <= v_cl + resize(s4_a, C_CL_W);
       s5_cr <= v_cr + resize(s4_c, C_CL_W);
       -- s6
@@ -526,7 +597,8 @@ begin
     end if;
   end process p_columns;
 
-  s7_column <= std_logic_vector(s7_cy) & std_logic_vector(s7_cx) & std_logic_vector(s7_cr) & std_logic_vector(s7_cl);
+  s7_xy     <= std_logic_vector(s7_cy) & std_logic_vector(s7_cx);
+  s7_column <= kept(s7_cy, s7_cx) & std_logic_vector(s7_cr) & std_logic_vector(s7_cl);
 
   -- s7 - s10: window sums ---------------------------------------------------------------------------------------------
   s6_lr <= std_logic_vector(s6_cr) & std_logic_vector(s6_cl);
@@ -551,13 +623,13 @@ begin
     port map (
       clk    => clk,
       ce     => s7_valid,
-      s_data => s7_column(C_C_W - 1 downto 2 * C_CL_W),
+      s_data => s7_xy,
       m_data => s7_xy_left
     );
 
   p_window : process (clk)
     variable v_lr : std_logic_vector(2 * C_CL_W - 1 downto 0);
-    variable v_xy : std_logic_vector(2 * C_CX_W - 1 downto 0);
+    variable v_xy : std_logic_vector(C_XY_W - 1 downto 0);
     variable v_l  : signed(C_SL_W - 1 downto 0);
     variable v_r  : signed(C_SL_W - 1 downto 0);
     variable v_x  : signed(C_DEN_W - 1 downto 0);
@@ -580,7 +652,7 @@ begin
         v_xy := (others => '0');
       end if;
       s8_dx <= resize(signed(v_xy(C_CX_W - 1 downto 0)), C_CX_W + 1) - resize(s7_cx, C_CX_W + 1);
-      s8_dy <= signed('0' & v_xy(2 * C_CX_W - 1 downto C_CX_W)) - signed('0' & s7_cy);
+      s8_dy <= signed('0' & v_xy(C_XY_W - 1 downto C_CX_W)) - signed('0' & s7_cy);
       if s7_valid = '1' then
         v_l := s8_l;
         v_r := s8_r;
@@ -649,6 +721,7 @@ begin
     variable v_den     : unsigned(63 downto 0);
     variable v_low_num : unsigned(63 downto 0); -- the low half, and zeros that a shift by 48 moves in
     variable v_low_den : unsigned(63 downto 0);
+    variable v_s15_den : unsigned(C_NORM - 1 downto 0);
   begin
     if rising_edge(clk) then
       -- s13
@@ -692,17 +765,21 @@ begin
       -- s15
       s15_valid <= s14_valid;
       if s14_den(C_NORM + 2) = '1' then
-        s15_num <= s14_num(C_NORM + 2 downto 3);
-        s15_den <= s14_den(C_NORM + 2 downto 3);
+        s15_num   <= s14_num(C_NORM + 2 downto 3);
+        v_s15_den := s14_den(C_NORM + 2 downto 3);
       elsif s14_den(C_NORM + 1) = '1' then
-        s15_num <= s14_num(C_NORM + 1 downto 2);
-        s15_den <= s14_den(C_NORM + 1 downto 2);
+        s15_num   <= s14_num(C_NORM + 1 downto 2);
+        v_s15_den := s14_den(C_NORM + 1 downto 2);
       elsif s14_den(C_NORM) = '1' then
-        s15_num <= s14_num(C_NORM downto 1);
-        s15_den <= s14_den(C_NORM downto 1);
+        s15_num   <= s14_num(C_NORM downto 1);
+        v_s15_den := s14_den(C_NORM downto 1);
       else
-        s15_num <= s14_num(C_NORM - 1 downto 0);
-        s15_den <= s14_den(C_NORM - 1 downto 0);
+        s15_num   <= s14_num(C_NORM - 1 downto 0);
+        v_s15_den := s14_den(C_NORM - 1 downto 0);
+      end if;
+      s15_kept <= v_s15_den;
+      if G_DIVIDER = 1 then
+        s15_kept <= not v_s15_den;
       end if;
       if rst = '1' then
         s13_valid <= '0';
@@ -712,20 +789,47 @@ begin
     end if;
   end process p_normalise;
 
-  -- Division ---------------------------------------------------------------------------------------------------------
-  div_num <= '0' & std_logic_vector(s15_num);
+  s15_den <= s15_kept when G_DIVIDER = 0 else not s15_kept;
 
-  u_divider : entity work.divider
-    generic map (
-      G_NUM_W  => C_NORM,
-      G_QUOT_W => G_MNCC_W
-    )
-    port map (
-      clk    => clk,
-      s_num  => div_num,
-      s_den  => std_logic_vector(s15_den),
-      m_quot => div_quot
-    );
+  -- Division ---------------------------------------------------------------------------------------------------------
+  g_steps : if G_DIVIDER = 0 generate
+    signal num : std_logic_vector(C_NORM downto 0);
+  begin
+
+    num <= '0' & std_logic_vector(s15_num);
+
+    u_divider : entity work.divider
+      generic map (
+        G_NUM_W  => C_NORM,
+        G_QUOT_W => G_MNCC_W
+      )
+      port map (
+        clk    => clk,
+        s_num  => num,
+        s_den  => std_logic_vector(s15_den),
+        m_quot => div_quot
+      );
+
+  end generate g_steps;
+
+  g_products : if G_DIVIDER /= 0 generate
+    signal nden : std_logic_vector(C_NORM - 1 downto 0);
+  begin
+
+    nden <= not std_logic_vector(s15_den);
+
+    u_divider : entity work.divider_mul
+      generic map (
+        G_QUOT_W => G_MNCC_W
+      )
+      port map (
+        clk    => clk,
+        s_num  => std_logic_vector(s15_num),
+        s_nden => nden,
+        m_quot => div_quot
+      );
+
+  end generate g_products;
 
   u_textured : entity work.delay_line
     generic map (

@@ -81,7 +81,7 @@ check_trace() { scripts/lint_trace.pl; }
 # Keys of a configuration and the generics they become, as in tb/rtl/CMakeLists.txt and tb/chip/CMakeLists.txt.
 engine_keys=(img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES
   window:WINDOW pix_bits:PIX_W weight_bits:WEIGHT_W interp_frac:INTERP_F mncc_bits:MNCC_W frac_bits:FRAC_W
-  lanes:LANES rectified:RECTIFIED)
+  lanes:LANES rectified:RECTIFIED divider:DIVIDER)
 arbiter_keys=(clk_khz:CLK_KHZ chunk_bytes:CHUNK_BYTES row_slots:ROW_SLOTS map_depth:MAP_DEPTH rx_slots:RX_SLOTS
   session_ms:SESSION_MS)
 generics_of() {
@@ -111,12 +111,12 @@ check_verilog() {
   local config engine bad=0 generics
   for config in tb/configs/*.json; do
     mapfile -t generics < <(generics_of "$config" "${engine_keys[@]}")
-    verilog_of psweep "$config" 13 "${generics[@]}" || bad=1
+    verilog_of psweep "$config" 14 "${generics[@]}" || bad=1
   done
   for config in tb/chip/configs/*.json; do
     engine=tb/configs/$(sed -nE 's/.*"engine": *"([a-z0-9_]+)".*/\1/p' "$config").json
     mapfile -t generics < <(generics_of "$engine" "${engine_keys[@]}"; generics_of "$config" "${arbiter_keys[@]}")
-    verilog_of psweep_top "$config" 19 "${generics[@]}" || bad=1
+    verilog_of psweep_top "$config" 20 "${generics[@]}" || bad=1
   done
   return $bad
 }

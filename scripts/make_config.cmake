@@ -5,10 +5,10 @@
 # IMG_ROWS default to the largest tile with its skirt, plus 2 for interpolation, plus DISPARITY columns (half of the
 # difference between the disparities of the nearest and the farthest plane). WAVES=1: for `make waves`; slower.
 set(keys PLANE_COLS PLANE_ROWS PLANES WINDOW PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS LANES RECTIFIED
-         WAVES)
-set(defaults 256 130 301 13 8 8 2 13 8 1 0 0)
-set(lowest 1 1 1 3 1 1 0 4 2 1 0 0)
-set(highest 4096 4096 1024 21 12 12 8 16 12 4 1 1)
+         DIVIDER WAVES)
+set(defaults 256 130 301 13 8 8 2 13 8 1 0 0 0)
+set(lowest 1 1 1 3 1 1 0 4 2 1 0 0 0)
+set(highest 4096 4096 1024 21 12 12 8 16 12 4 1 1 1)
 
 if(NOT DIR)
   message(FATAL_ERROR "make_config: DIR=<folder> is missing")
@@ -65,7 +65,7 @@ file(
   \"img_cols\": ${IMG_COLS}, \"img_rows\": ${IMG_ROWS}, \"plane_cols\": ${PLANE_COLS}, \"plane_rows\": ${PLANE_ROWS},
   \"planes\": ${PLANES}, \"window\": ${WINDOW}, \"pix_bits\": ${PIX_BITS}, \"weight_bits\": ${WEIGHT_BITS},
   \"interp_frac\": ${INTERP_FRAC}, \"mncc_bits\": ${MNCC_BITS}, \"frac_bits\": ${FRAC_BITS}, \"lanes\": ${LANES},
-  \"rectified\": ${RECTIFIED},
+  \"rectified\": ${RECTIFIED}, \"divider\": ${DIVIDER},
   \"waves\": ${waves}
 }
 ")

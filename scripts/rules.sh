@@ -77,12 +77,12 @@ try interpolation "s/(s1_upper_start.*)'0' & p00/\1'0' \& p10/" "interpolation: 
 try interpolation "s/(s1_lower_start.*)'0' & p01/\1'0' \& p11/" "interpolation: the lower row's sum"
 try interpolation 's/s4_start <= shift_left\(resize\(s3_upper/s4_start <= shift_left(resize(s3_lower/' \
   'interpolation: the sum between the rows'
-try similarity 's/raddr => std_logic_vector\(s1_line\)/raddr => s2_line/' 'similarity: the sample M rows above'
+try similarity 's/raddr => std_logic_vector\(next_line\)/raddr => s2_line/' 'similarity: the sample M rows above'
 try similarity 's/s8_l <= v_l \+/s8_l <= v_l + v_l +/' 'similarity: the sum of l'
 try similarity 's/s12_half  <= s11_x \+ /s12_half <= s11_x - /' 'similarity: the covariance is larger'
-try similarity 's/s15_den <= s14_den\(C_NORM downto 1\)/s15_den <= s14_den(C_NORM - 1 downto 0)/' \
+try similarity 's/v_s15_den := s14_den\(C_NORM downto 1\)/v_s15_den := s14_den(C_NORM - 1 downto 0)/' \
   "similarity: the quotient's operands"
-try similarity 's/raddr => s3_col/raddr => s7_col/' 'similarity: the sums of a column'
+try similarity 's/raddr => s2_col/raddr => s7_col/' 'similarity: the sums of a column'
 try psweep 's/\+ updating_latency\(G_FRAC_W, G_LANES\);/;/' 'updating: unloading begins while'
 try updating "s/(s1_first <=) first;/\1 '0';/" 'updating: a cell of the map is unknown'
 try updating 's/old_best - lower;/lower - old_best;/' "updating: the parabola's quotient"

@@ -46,7 +46,7 @@ between() { # between NAME LOW HIGH
 }
 primes=(2 3 5 7 11 13 17 19 23 29 31 37)
 names=() wanted=()
-window=0 cols=0 rows=0 planes=0 lanes=0 pix=0 weight=0 interp=0 mncc=0 frac=0 rectified=0 disparity=0 prime=0
+window=0 cols=0 rows=0 planes=0 lanes=0 pix=0 weight=0 interp=0 mncc=0 frac=0 rectified=0 divider=0 disparity=0 prime=0
 # Drawn in this shell, one after the other, so that --only finds the same.
 for ((k = 1; k <= count; k++)); do
   pick window 3 5 7 9 11 13 15 17 19 21
@@ -66,6 +66,7 @@ for ((k = 1; k <= count; k++)); do
     pick cols "${primes[@]}"
     pick rows "${primes[@]}"
   fi
+  pick divider 0 1
   case $k in
     1) window=21 cols=1 rows=1 planes=1 lanes=1 ;;      # one cell, one plane, the largest window
     2) window=3 cols=1 rows=17 planes=2 lanes=4 ;;      # one column, fewer planes than lanes, the smallest window
@@ -77,7 +78,8 @@ for ((k = 1; k <= count; k++)); do
   if [ "$interp" -gt 8 ]; then interp=8; fi
   name=s${seed}_$k
   args="PLANE_COLS=$cols PLANE_ROWS=$rows PLANES=$planes WINDOW=$window PIX_BITS=$pix WEIGHT_BITS=$weight"
-  args+=" INTERP_FRAC=$interp MNCC_BITS=$mncc FRAC_BITS=$frac LANES=$lanes RECTIFIED=$rectified DISPARITY=$disparity"
+  args+=" INTERP_FRAC=$interp MNCC_BITS=$mncc FRAC_BITS=$frac LANES=$lanes RECTIFIED=$rectified DIVIDER=$divider"
+  args+=" DISPARITY=$disparity"
   if [ -n "$only" ] && [ "$only" -ne "$k" ]; then continue; fi
   mapfile -t defines < <(tr ' ' '\n' <<< "$args" | sed 's/^/-D/')
   cmake -D DIR="$out/configs" -D NAME="$name" -D WAVES=1 "${defines[@]}" -P scripts/make_config.cmake \

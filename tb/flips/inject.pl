@@ -25,7 +25,7 @@ while ($text =~ /^module (\w+)\b(.*?)^endmodule/gms) {
 my %instances = (psweep => 1);
 $instances{$_->[1]} += $instances{$_->[0]} // 0 for @uses;
 my @names = sort { length $b <=> length $a } qw(control address_generator storage interpolation similarity updating
-  divider delay_line stream_fifo ram_sdp ram_2r psweep);
+  divider divider_mul delay_line stream_fifo ram_sdp ram_2r ram_wide psweep);
 
 my (@list, $count);
 $text =~ s{^(module (\w+)\b.*?^endmodule)}{edit($2, $1)}gmse;

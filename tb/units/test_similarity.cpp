@@ -5,9 +5,12 @@
 #include <random>
 
 #include "Vsimilarity_13.h"
+#include "Vsimilarity_13_mul.h"
+#include "Vsimilarity_15.h"
 #include "Vsimilarity_21.h"
 #include "Vsimilarity_3.h"
 #include "Vsimilarity_5.h"
+#include "Vsimilarity_7.h"
 #include "golden/control.hpp"
 #include "golden/similarity.hpp"
 #include "support/catch.hpp"
@@ -19,7 +22,7 @@ using namespace psweep::tb;
 
 namespace {
 
-enum class Texture { kRandom, kEqual, kConstant, kMaximum, kChecker, kOpposite, kFaint };
+enum class Texture { kRandom, kEqual, kConstant, kMaximum, kChecker, kOpposite, kFaint, kLow, kColumns };
 
 template <class Dut>
 struct Bench : Agent {
@@ -76,6 +79,14 @@ struct Bench : Agent {
         return {(i + j) % 2 ? top : 0, (i + j) % 2 ? top : 0};
       case Texture::kOpposite:
         return {(i + j) % 2 ? top : 0, (i + j) % 2 ? 0 : top};
+      case Texture::kLow:
+        return {0, top};
+      case Texture::kColumns: {
+        // The column decides how many samples lie at the ends of the range and in how many of them l and r are
+        // opposite, so that its sums reach the corners of what they may be.
+        const int a = i / 32 % 2 && below(2) ? top : 0, b = below(7) < i % 8 ? top - a : a;
+        return below(4) <= i / 8 % 4 ? std::pair{a, b} : std::pair{top / 2, top / 2};
+      }
       case Texture::kFaint: {
         const int a = top / 2 + (below(50) == 0 ? 1 : 0);
         return {a, below(3) == 0 ? top / 2 : a};
@@ -145,8 +156,9 @@ template <class Dut>
 void run_window(int window, int sample_bits, int mncc_bits, int max_cols) {
   INFO("seed " << test_seed() << " window " << window);
   Bench<Dut> bench(window, sample_bits, mncc_bits);
-  for (const Texture kind : {Texture::kRandom, Texture::kEqual, Texture::kConstant, Texture::kMaximum,
-                             Texture::kChecker, Texture::kOpposite, Texture::kFaint}) {
+  for (const Texture kind :
+       {Texture::kRandom, Texture::kEqual, Texture::kConstant, Texture::kMaximum, Texture::kChecker, Texture::kOpposite,
+        Texture::kFaint, Texture::kLow, Texture::kColumns}) {
     bench.run_plane(kind, window, window, 0);  // one cell
     bench.run_plane(kind, window + bench.below(max_cols - window + 1), window + bench.below(window), 0);
     bench.run_plane(kind, max_cols, 2 * window + 3, 0.02);
@@ -159,8 +171,11 @@ void run_window(int window, int sample_bits, int mncc_bits, int max_cols) {
 
 TEST_CASE("similarity: 3 x 3, 8-bit samples") { run_window<Vsimilarity_3>(3, 8, 16, 19); }
 TEST_CASE("similarity: 5 x 5, samples 8.3") { run_window<Vsimilarity_5>(5, 11, 9, 16); }
+TEST_CASE("similarity: 7 x 7, samples of one bit, divided in products") { run_window<Vsimilarity_7>(7, 1, 8, 64); }
 TEST_CASE("similarity: 13 x 13, samples 8.2") { run_window<Vsimilarity_13>(13, 10, 13, 37); }
-TEST_CASE("similarity: 21 x 21, samples 8.8") { run_window<Vsimilarity_21>(21, 16, 4, 40); }
+TEST_CASE("similarity: 13 x 13, divided in products") { run_window<Vsimilarity_13_mul>(13, 10, 13, 37); }
+TEST_CASE("similarity: 15 x 15, 4-bit samples, divided in products") { run_window<Vsimilarity_15>(15, 4, 14, 80); }
+TEST_CASE("similarity: 21 x 21, samples 8.8, too few bits for products") { run_window<Vsimilarity_21>(21, 16, 4, 40); }
 
 TEST_CASE("similarity: a reset forgets what is on its way") {
   INFO("seed " << test_seed());
