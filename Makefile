@@ -17,7 +17,7 @@ FLOW_OPTIONS = $(if $(BOARD),--board $(BOARD)) $(if $(TOP),--top $(TOP)) $(if $(
 
 .PHONY: help
 help: ## This list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
 	@echo '  All of them: JOBS=n (default: all cores), VERBOSE=1, SETUP=no (do not install packages)'
 
 .PHONY: setup
@@ -94,16 +94,24 @@ cost-update: setup ## All counts again into scripts/cost/baseline.json, docs/cos
 	@scripts/cost/report.py --update
 
 .PHONY: dse
-dse: setup ## Design space: resources, clocks, accuracy, resumable: build/dse/index.html   GRID=file SLURM=1
+dse: setup ## Design space: resources, clocks, accuracy, resumable: build/dse/index.html   GRID=file SLURM=1 PAGES=1
+	@$(if $(and $(PAGES),$(GRID)),echo 'dse: PAGES=1 is for the default grid' >&2; exit 2,true)
 	@scripts/setup.sh cost dse
 	@scripts/build.sh psweep shape_table psweep_accuracy
 	@scripts/dse/dse.sh $(if $(GRID),--grid $(GRID)) $(if $(SLURM),--slurm)
+	@$(if $(PAGES),scripts/dse/pages.py --take build/dse,true)
 
 .PHONY: dse-check
 dse-check: setup ## The workflow of make dse: killed and resumed; one source changed, only its dependants run
 	@scripts/setup.sh cost dse
 	@scripts/build.sh psweep shape_table psweep_accuracy
 	@scripts/dse/test_workflow.sh
+
+.PHONY: dse-slurm-check
+dse-slurm-check: setup ## The same on a one-node Slurm of this machine: as root, packages slurm-wlm and munge
+	@scripts/setup.sh cost dse
+	@scripts/build.sh psweep shape_table psweep_accuracy
+	@scripts/dse/one_node.sh scripts/dse/test_workflow.sh --slurm
 
 .PHONY: pnr
 pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (half an hour)   CFG=tile SEEDS=1,2,3

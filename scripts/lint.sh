@@ -13,6 +13,7 @@
 #   vhdl       no construct that the conversion to Verilog breaks (lint_text.pl)
 #   units      every entity has a golden model, a test and a page
 #   tables     docs/<entity>.md: contract, diagram; generics and ports are those of the entity (lint_tables.pl)
+#   pages      tables of docs/dse.md are those of docs/dse/*.csv (scripts/dse/pages.py)
 #   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
 #              (scripts/cmake/ghdl_netlist.vlt)
@@ -75,6 +76,10 @@ check_tables() {
   local units
   mapfile -t units < <(printf '%s\n' "${vhdl_files[@]}" | grep -v '_pkg\.vhd$')
   scripts/lint_tables.pl "${units[@]}"
+}
+check_pages() {
+  command -v python3 > /dev/null || skip "python3 is not installed" || return
+  scripts/dse/pages.py --check
 }
 check_trace() { scripts/lint_trace.pl; }
 
@@ -144,7 +149,7 @@ check_shell() {
   shellcheck --severity=warning "${scripts[@]}"
 }
 
-checks=(layout text links files analyse vhdl units tables trace verilog format shell)
+checks=(layout text links files analyse vhdl units tables pages trace verilog format shell)
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
   --format)
