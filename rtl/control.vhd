@@ -8,7 +8,7 @@
 --              max(sweep_cols, C_ROW_MIN) clocks; the first sample in the clock after the last pixel; no bubble between
 --              rows or sets
 --   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
---   Writes   : take effect two clocks after they are on s_cfg
+--   Writes   : take effect two clocks after they are on s_cfg, those of table and offsets three
 --   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
 --              work the address of a write is not looked at. A last map beat beats an abort in the same clock
 --   Upsets   : the state has a parity bit: no upset of one bit makes another state of it. A code without a name and a
@@ -329,11 +329,22 @@ begin
   table_next  <= to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) = table_words);
   table_ok    <= cfg_in_table
                  and to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) <= table_words);
-  table_we    <= cfg_table and table_ok;
-  cfg_data    <= cfg_word(31 downto 0);
-  table_addr  <= cfg_word(C_TABLE_W + 31 downto 32);
-  offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
-  offset_addr <= cfg_word(33 downto 32);
+
+  -- A register more, as the table's blocks lie far apart. The first row is read long after the last write.
+  p_table : process (clk)
+  begin
+    if rising_edge(clk) then
+      cfg_data    <= cfg_word(31 downto 0);
+      table_we    <= cfg_table and table_ok;
+      table_addr  <= cfg_word(C_TABLE_W + 31 downto 32);
+      offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
+      offset_addr <= cfg_word(33 downto 32);
+      if rst = '1' then
+        table_we  <= '0';
+        offset_we <= '0';
+      end if;
+    end if;
+  end process p_table;
 
   event_busy    <= not is_idle and (cfg_low or cfg_middle or cfg_high or command_start);
   event_address <= (cfg_table and not table_ok)

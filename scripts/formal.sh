@@ -142,9 +142,11 @@ proof async_fifo async_fifo '-gG_DATA_W=1 -gG_DEPTH_LOG2=2' \
   rtl/async_fifo.vhd 'reader works during the answer' 's/(r_hold +<= r_rst or r_request) or r_answer/\1/' \
   rtl/async_fifo.vhd 'address without the fold' 's/gray\(C_TOP\) xor gray\(C_TOP - 1\)/gray(C_TOP - 1)/'
 
-proof stream_fifo stream_fifo '-gG_DATA_W=3' '' 'rtl/psweep_pkg.vhd rtl/stream_fifo.vhd' \
-  rtl/stream_fifo.vhd 'skid not emptied' "/main_valid <= skid_valid or s_fire/{n;s/'0'/skid_valid/}" \
-  rtl/stream_fifo.vhd 'input before skid' 's/main_data <= skid_data/main_data <= s_tdata/'
+proof stream_fifo stream_fifo '-gG_DATA_W=3 -gG_DEPTH_LOG2=2' '' \
+  'rtl/psweep_pkg.vhd rtl/ram_sdp.vhd rtl/stream_fifo.vhd' \
+  rtl/stream_fifo.vhd 'one place too many' 's/write_place \+ 1 \/= read_place/write_place + 2 \/= read_place/' \
+  rtl/stream_fifo.vhd 'shown while it is written' 's/to_bit\(next_place \/= write_place\);/s_fire or &/' \
+  rtl/stream_fifo.vhd 'beats behind are forgotten' 's/more +<= s_fire or/more <=/'
 
 proof crc_step crc_step '' '' 'rtl/eth_pkg.vhd tb/formal/crc_step.vhd' \
   rtl/eth_pkg.vhd 'one coefficient missing' 's/EDB88320/EDB88300/' \

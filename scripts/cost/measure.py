@@ -249,7 +249,11 @@ def netlist(entity, family, generics, rtl, path):
     with tempfile.TemporaryDirectory(prefix="psweep-cost-") as folder:
         work = pathlib.Path(folder)
         (work / "top.v").write_text(convert(entity, generics, rtl, work)[0])
-        run_yosys(counted(entity, family, False, work) + [f"write_verilog -noattr {work}/netlist.v"], work)
+        run_yosys(counted(entity, family, False, work) + [f"write_json {work}/netlist.json"], work)
+        merged = json.loads((work / "netlist.json").read_text())
+        netlists.merge_output_registers(merged)
+        (work / "netlist.json").write_text(json.dumps(merged))
+        run_yosys([f"read_json {work}/netlist.json", f"write_verilog -noattr {work}/netlist.v"], work)
         pathlib.Path(path).write_text((work / "netlist.v").read_text())
 
 
@@ -275,6 +279,7 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     commands += counted(top, family, no_dsp, work, rows) + [f"write_json {work}/netlist.json"]
     run_yosys(commands, work)
     found = json.loads((work / "netlist.json").read_text())
+    merged = netlists.merge_output_registers(found)
     memories, products = netlists.memories(json.loads((work / "memories.json").read_text()), top, units)
     parts = {}
 
@@ -291,7 +296,7 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     if not counts["lut"] and not counts["ff"] and not any(counts[k] for k in ("ram36", "ram18", "ram48")):
         raise CostError(f"{top}: nothing is left of it after synthesis")
     result = {"counts": counts, "cells": plain(whole), "memories": memories, "products": products,
-              "memory_bits": sum(m["words"] * m["bits"] for m in memories)}
+              "memory_bits": sum(m["words"] * m["bits"] for m in memories), "registers_in_ram": merged}
     if family != "ecp5" and not hierarchy:
         best, histogram = netlists.longest(netlists.Levels(family, found["modules"][top]), units)
         result["levels"] = {"longest": best.pop(""), "by_unit": dict(sorted(best.items())), "histogram": histogram}

@@ -210,6 +210,89 @@ class Levels:
         return luts, carries, self.start_name(first), end
 
 
+# Read ports of block RAMs: outputs, clock, parameters that switch the output register on, their value, its enables.
+_XILINX = (("DO[A]D?O?|DOPA(DOP)?", r"CLKA(RDCLK)?", ("DOA_REG",), "1", ("REGCEA(REGCE)?",)),
+           ("DO[B]D?O?|DOPB(DOP)?", r"CLKB(WRCLK)?", ("DOB_REG",), "1", ("REGCEB",)))
+_XILINX_SDP = (("DOP?", "RDCLK", ("DO_REG",), "1", ("REGCE",)),)
+READ_PORTS = {
+    "DP16KD": ((r"DOA\d+", "CLKA", ("REGMODE_A",), "OUTREG", ()), (r"DOB\d+", "CLKB", ("REGMODE_B",), "OUTREG", ())),
+    "PDPW16KD": ((r"DO\d+", "CLKR", ("REGMODE",), "OUTREG", ()),),
+    "RAMB18E1": _XILINX, "RAMB36E1": _XILINX, "RAMB18": _XILINX, "RAMB36": _XILINX,
+    "RAMB18SDP": _XILINX_SDP, "RAMB36SDP": _XILINX_SDP,
+}
+# Simple dual port of Virtex-6: one read port over both halves.
+_XILINX_WIDE = (("DO[AB]DO|DOP[AB]DOP", "CLKARDCLK", ("DOA_REG", "DOB_REG"), "1", ("REGCEAREGCE", "REGCEB")),)
+
+
+def merge_output_registers(netlist):
+    """Registers that do nothing but hold what a block RAM put out become the block's own output register: the devices
+    have one, vendor tools use it, Yosys does not. Only registers without enable and reset, all that look at the port.
+    Returns how many FF went. scripts/sim_gates.sh simulates the result."""
+    return sum(_merge(module) for module in netlist["modules"].values())
+
+
+def _merge(module):
+    cells, sinks, gone = module["cells"], {}, 0
+    for name, cell in cells.items():
+        for port, bits in cell["connections"].items():
+            if cell["port_directions"].get(port, "input") == "input":
+                for bit in bits:
+                    sinks.setdefault(bit, []).append((name, port))
+    for port in module["ports"].values():
+        for bit in port["bits"]:
+            sinks.setdefault(bit, []).append((None, ""))
+
+    def constant(cell, port, value):
+        return cell["connections"].get(port, [value])[0] in (value, "x")
+
+    def on(value):
+        return value if isinstance(value, str) and not set(value) <= set("01xz") else \
+            int(str(value).replace("x", "0").replace("z", "0"), 2) != 0
+
+    def plain(name, clock):
+        """Data pin of a register without enable and reset, of this clock; else None."""
+        cell = cells[name]
+        pins, parameters = cell["connections"], cell["parameters"]
+        if cell["type"] == "TRELLIS_FF":
+            enabled = parameters.get("CEMUX", "1") == "1" or constant(cell, "CE", "1")
+            good = enabled and constant(cell, "LSR", "0") and parameters.get("CLKMUX", "CLK") == "CLK"
+            return "DI" if good and pins["CLK"] == clock else None
+        if cell["type"] == "FDRE":
+            inverted = any(on(v) for k, v in parameters.items() if k.startswith("IS_"))
+            good = constant(cell, "CE", "1") and constant(cell, "R", "0") and not inverted \
+                and parameters.get("INIT", "x")[-1] != "1"
+            return "D" if good and pins["C"] == clock else None
+        return None
+
+    def ports_of(cell):
+        if cell["type"] in ("RAMB18E1", "RAMB36E1") and cell["parameters"].get("RAM_MODE") == "SDP":
+            return _XILINX_WIDE
+        return READ_PORTS.get(cell["type"], ())
+
+    for cell in list(cells.values()):
+        if any(cell["parameters"].get(f"RAM_EXTENSION_{side}", "NONE") != "NONE" for side in "AB"):
+            continue  # a block that another one's outputs go through
+        for outputs, clock_pin, modes, value, enables in ports_of(cell):
+            pins = cell["connections"]
+            clock = next((bits for port, bits in pins.items() if re.fullmatch(clock_pin, port)), None)
+            used = [(port, place) for port, bits in pins.items() if re.fullmatch(outputs, port)
+                    for place, bit in enumerate(bits) if sinks.get(bit)]
+            ends = [sinks[pins[port][place]] for port, place in used]
+            if not used or any(on(cell["parameters"].get(mode, "0")) not in (False, "NOREG") for mode in modes):
+                continue
+            if not all(len(e) == 1 and e[0][0] in cells and plain(e[0][0], clock) == e[0][1] for e in ends):
+                continue
+            for mode in modes:
+                cell["parameters"][mode] = value
+            for port in pins:
+                if any(re.fullmatch(pattern, port) for pattern in enables):
+                    pins[port] = ["1"]
+            for (port, place), end in zip(used, ends):
+                pins[port][place] = cells.pop(end[0][0])["connections"]["Q"][0]
+                gone += 1
+    return gone
+
+
 def owner(path_end, entities):
     """Entity in which an end of a path lies, by the instance names u_<entity> of the source; '' for the top."""
     found = re.findall(r"u_([a-z0-9_]+?)(?=[.\[/ ]|_u_|$)", path_end)

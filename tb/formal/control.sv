@@ -29,10 +29,12 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   localparam IDLE = 0, LOAD = 1, SWEEP = 2, FLUSH = 3, UNLOAD = 4, DRAIN = 5;
 
   // What the words on s_cfg say.
-  wire [15:0] address = s_cfg_tdata[47:32];
-  wire [31:0] value = s_cfg_tdata[31:0];
-  wire write = s_cfg_tvalid && state == IDLE;
-  wire command = s_cfg_tvalid && address == 0;
+  reg cfg = 0;                                      // a word a clock ago
+  reg [47:0] cfg_word = 0;
+  wire [15:0] address = cfg_word[47:32];
+  wire [31:0] value = cfg_word[31:0];
+  wire write = cfg && state == IDLE;
+  wire command = cfg && address == 0;
   wire abort = command && value[1];
   wire start = command && value[0] && !value[1] && state == IDLE;
   reg [4:0] known = 0;
@@ -55,6 +57,8 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   wire taken = s_pix_tvalid && state == LOAD;
 
   always @($global_clock) if (clk) begin
+    cfg <= s_cfg_tvalid && !rst;
+    cfg_word <= s_cfg_tdata;
     if (rst) begin
       begun <= 1;
       known <= 0;
