@@ -67,7 +67,7 @@ architecture rtl of divider_mul is
     return inverse(C_NUM_W - 1 + C_REC_W, (2 ** (C_INDEX_W + 1) - line) * 2 ** C_LOW_W - 1);
   end function at_high;
 
-  -- Growth from den to den, times 2**C_LOW_W, rounded up.
+  -- What 2**C_LOW_W steps of den add from the largest of the line downwards, rounded up.
   function slope_at (line : natural) return natural is
   begin
     return ((at_low(line) - at_high(line)) * 2 ** C_LOW_W + 2 ** C_LOW_W - 2) / (2 ** C_LOW_W - 1);

@@ -16,6 +16,7 @@
 --               banks an image instead of four. Same results where all samples lie on rows of pixels; a sample between
 --               rows counts as not loaded (window error)
 --   Divider   : G_DIVIDER = 1 divides in three products a lane: less logic, same results and clocks (similarity)
+--   Split     : G_SPLIT = 1 for multipliers of 18 x 18 bits: a higher clock there, same results and clocks (similarity)
 --   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
 --   dbg_*     : outputs of the stages for waves and tests; leave open
 --   Golden    : sw/golden/psweep.hpp
@@ -39,7 +40,8 @@ entity psweep is
     G_FRAC_W     : integer := 8;
     G_LANES      : integer := 1;
     G_RECTIFIED  : integer := 0;
-    G_DIVIDER    : integer := 0
+    G_DIVIDER    : integer := 0;
+    G_SPLIT      : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -462,7 +464,8 @@ begin
         G_SAMPLE_W => C_SAMPLE_W,
         G_MNCC_W   => G_MNCC_W,
         G_MAX_COLS => G_PLANE_COLS + G_WINDOW - 1,
-        G_DIVIDER  => G_DIVIDER
+        G_DIVIDER  => G_DIVIDER,
+        G_SPLIT    => G_SPLIT
       )
       port map (
         clk           => clk,

@@ -29,6 +29,7 @@ entity psweep_top is
     G_LANES       : integer := 1;
     G_RECTIFIED   : integer := 0;
     G_DIVIDER     : integer := 0;
+    G_SPLIT       : integer := 0;
     G_CLK_KHZ     : integer := 166000;
     G_CHUNK_BYTES : integer := 1408; -- 16 .. 1440
     G_ROW_SLOTS   : integer := 0; -- chunks; 0: as many as the largest window needs
@@ -232,7 +233,8 @@ begin
       G_FRAC_W     => G_FRAC_W,
       G_LANES      => G_LANES,
       G_RECTIFIED  => G_RECTIFIED,
-      G_DIVIDER    => G_DIVIDER
+      G_DIVIDER    => G_DIVIDER,
+      G_SPLIT      => G_SPLIT
     )
     port map (
       clk           => clk,

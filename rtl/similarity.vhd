@@ -8,6 +8,8 @@
 --             dy = a (l' + l'old) + c (r' + r'old). Window sums follow from column sums likewise, as running sums.
 --             Nothing grows with M but RAM depth.
 --   Divider : G_DIVIDER = 0 is divider, one bit a stage; 1 is divider_mul, three products. Same results and latency
+--   Split   : G_SPLIT = 1 multiplies the differences of x and y by n in two parts each, for devices whose multipliers
+--             have 18 x 18 bits. Same results and latency
 --   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
 --             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
@@ -31,7 +33,8 @@ entity similarity is
     G_SAMPLE_W : integer := 10;
     G_MNCC_W   : integer := 13;
     G_MAX_COLS : integer := 268;
-    G_DIVIDER  : integer := 0
+    G_DIVIDER  : integer := 0;
+    G_SPLIT    : integer := 0
   );
   port (
     clk : in  std_logic;
@@ -75,6 +78,10 @@ architecture rtl of similarity is
   constant C_FOLD   : boolean := 8 * G_WINDOW <= 7 * 2 ** C_GROW and C_CX_W >= 4;
   constant C_KEPT_W : integer := C_XY_W - 1 - boolean'pos(C_FOLD); -- of x and y
   constant C_C_W    : integer := C_KEPT_W + 2 * C_CL_W;
+
+  -- The lower bits of a difference of x or y that are multiplied by themselves, and whether they are.
+  constant C_LOW_W : integer := 16;
+  constant C_SPLIT : boolean := G_SPLIT = 1 and C_CX_W >= 18;
 
   -- Delay of M rows: one circular buffer, begun anew when M rows have been written, so that it fits any row length.
   constant C_LINE_DEPTH : integer := G_WINDOW * G_MAX_COLS;
@@ -176,7 +183,7 @@ architecture rtl of similarity is
   signal s8_l         : signed(C_SL_W - 1 downto 0);
   signal s8_r         : signed(C_SL_W - 1 downto 0);
 
-  -- s9: differences of x and y times n
+  -- s9: differences of x and y times n; with C_SPLIT the parts above C_LOW_W bits, and the lower parts, times n
   signal s9_valid     : std_logic;
   signal s9_cell      : std_logic;
   signal s9_row_first : std_logic;
@@ -184,6 +191,8 @@ architecture rtl of similarity is
   signal s9_r         : signed(C_SL_W - 1 downto 0);
   signal s9_n_dx      : signed(C_CX_W + C_NGROW + 1 downto 0);
   signal s9_n_dy      : signed(C_CX_W + C_NGROW + 1 downto 0);
+  signal s9_n_low_x   : unsigned(C_LOW_W + C_NGROW - 1 downto 0);
+  signal s9_n_low_y   : unsigned(C_LOW_W + C_NGROW - 1 downto 0);
 
   -- s10: -n S(x), -n S(y) - 1
   signal s10_valid : std_logic;
@@ -331,6 +340,9 @@ begin
     severity failure;
   assert G_DIVIDER = 0 or G_DIVIDER = 1
     report "similarity: G_DIVIDER=" & integer'image(G_DIVIDER) & " is neither 0 nor 1"
+    severity failure;
+  assert G_SPLIT = 0 or G_SPLIT = 1
+    report "similarity: G_SPLIT=" & integer'image(G_SPLIT) & " is neither 0 nor 1"
     severity failure;
   assert G_MAX_COLS >= G_WINDOW and G_MAX_COLS <= 4096
     report "similarity: G_MAX_COLS=" & integer'image(G_MAX_COLS) & " outside G_WINDOW..4096"
@@ -669,8 +681,15 @@ begin
       s9_row_first <= s8_flags(0);
       s9_l         <= s8_l;
       s9_r         <= s8_r;
-      s9_n_dx      <= s8_dx * to_signed(C_N, C_NGROW + 1);
-      s9_n_dy      <= s8_dy * to_signed(C_N, C_NGROW + 1);
+      if C_SPLIT then
+        s9_n_dx    <= resize(s8_dx(C_CX_W downto C_LOW_W) * to_signed(C_N, C_NGROW + 1), s9_n_dx'length);
+        s9_n_dy    <= resize(s8_dy(C_CX_W downto C_LOW_W) * to_signed(C_N, C_NGROW + 1), s9_n_dy'length);
+        s9_n_low_x <= unsigned(s8_dx(C_LOW_W - 1 downto 0)) * to_unsigned(C_N, C_NGROW);
+        s9_n_low_y <= unsigned(s8_dy(C_LOW_W - 1 downto 0)) * to_unsigned(C_N, C_NGROW);
+      else
+        s9_n_dx <= s8_dx * to_signed(C_N, C_NGROW + 1);
+        s9_n_dy <= s8_dy * to_signed(C_N, C_NGROW + 1);
+      end if;
       -- s10
       s10_valid <= s9_valid and s9_cell;
       s10_l     <= s9_l;
@@ -683,8 +702,13 @@ begin
           v_x := (others => '0');
           v_y := (others => s9_row_first); -- ones; as a constant of this width they would be converted wrongly
         end if;
-        s10_x <= v_x + fit(s9_n_dx, C_DEN_W);
-        s10_y <= v_y + fit(s9_n_dy, C_DEN_W);
+        if C_SPLIT then
+          s10_x <= v_x + fit(s9_n_dx & to_signed(0, C_LOW_W), C_DEN_W) + fit(signed('0' & s9_n_low_x), C_DEN_W);
+          s10_y <= v_y + fit(s9_n_dy & to_signed(0, C_LOW_W), C_DEN_W) + fit(signed('0' & s9_n_low_y), C_DEN_W);
+        else
+          s10_x <= v_x + fit(s9_n_dx, C_DEN_W);
+          s10_y <= v_y + fit(s9_n_dy, C_DEN_W);
+        end if;
       end if;
       if rst = '1' then
         s8_valid <= '0';

@@ -170,10 +170,12 @@ void run_window(int window, int sample_bits, int mncc_bits, int max_cols) {
 }  // namespace
 
 TEST_CASE("similarity: 3 x 3, 8-bit samples") { run_window<Vsimilarity_3>(3, 8, 16, 19); }
-TEST_CASE("similarity: 5 x 5, samples 8.3") { run_window<Vsimilarity_5>(5, 11, 9, 16); }
+TEST_CASE("similarity: 5 x 5, samples 8.3, products split") { run_window<Vsimilarity_5>(5, 11, 9, 16); }
 TEST_CASE("similarity: 7 x 7, samples of one bit, divided in products") { run_window<Vsimilarity_7>(7, 1, 8, 64); }
 TEST_CASE("similarity: 13 x 13, samples 8.2") { run_window<Vsimilarity_13>(13, 10, 13, 37); }
-TEST_CASE("similarity: 13 x 13, divided in products") { run_window<Vsimilarity_13_mul>(13, 10, 13, 37); }
+TEST_CASE("similarity: 13 x 13, divided in products, products split") {
+  run_window<Vsimilarity_13_mul>(13, 10, 13, 37);
+}
 TEST_CASE("similarity: 15 x 15, 4-bit samples, divided in products") { run_window<Vsimilarity_15>(15, 4, 14, 80); }
 TEST_CASE("similarity: 21 x 21, samples 8.8, too few bits for products") { run_window<Vsimilarity_21>(21, 16, 4, 40); }
 
