@@ -5,7 +5,7 @@
 --   States   : idle, load (pixels), sweep (samples), flush (cells on their way to the map), unload, drain (pixels of a
 --              tile that was refused or too long)
 --   Sweep    : G_LANES planes at once, a set, then the next set; row after row, one sample a clock and lane; rows of
---              max(sweep_cols, C_ROW_MIN) clocks; the first sample in the clock after the last pixel; no bubble between
+--              max(sweep_cols, C_ROW_MIN) clocks; the first sample two clocks after the last pixel; no bubble between
 --              rows or sets
 --   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
 --   Writes   : take effect two clocks after they are on s_cfg, those of table and offsets three
@@ -82,7 +82,7 @@ entity control is
     m_lanes       : out std_logic_vector(G_LANES - 1 downto 0); -- planes set * G_LANES + lane that the tile has
 
     -- Updating.
-    map_start  : out std_logic; -- pulse with the first sample of a tile
+    map_start  : out std_logic; -- pulse before the first sample of a tile
     map_unload : out std_logic; -- pulse: all planes are in the map
     map_abort  : out std_logic; -- pulse: forget everything on its way
     map_more   : in  std_logic; -- map beats will follow the present one
@@ -117,7 +117,7 @@ architecture rtl of control is
   constant C_TABLE_WORDS : integer := 8 * G_PLANES;
   -- The last cell is in the map so many clocks after the last sample. (A count of planes on their way would wait for
   -- ever, were one of its bits upset.)
-  constant C_FLUSH       : integer := G_LATENCY + 1;
+  constant C_FLUSH       : integer := G_LATENCY + 2;
   constant C_FLUSH_W     : integer := 7;
 
   -- The state with even parity: whichever bit is upset, the code is none of these.
@@ -193,6 +193,7 @@ architecture rtl of control is
   signal last_set    : unsigned(C_SET_W - 1 downto 0);
   signal at_set_end   : std_logic; -- in the last set
   signal at_set_end_q : std_logic;
+  signal lanes        : std_logic_vector(G_LANES - 1 downto 0); -- m_lanes, a clock ahead
   signal last_col_less_1 : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
   signal last_row_less_1 : unsigned(C_ROW_W - 1 downto 0);
   signal one_col     : std_logic; -- rows of one pixel
@@ -282,8 +283,8 @@ begin
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
     report "control: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
     severity failure;
-  assert G_LATENCY >= 1 and G_LATENCY <= 126
-    report "control: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..126"
+  assert G_LATENCY >= 1 and G_LATENCY <= 125
+    report "control: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..125"
     severity failure;
 
   is_idle   <= to_bit(state_q = C_IDLE);
@@ -435,11 +436,11 @@ begin
     end if;
   end process p_registers;
 
-  m_lanes(0) <= '1';
+  lanes(0) <= '1';
 
   g_mask : for n in 1 to G_LANES - 1 generate
-    m_lanes(n) <= not at_set_end or to_bit(last_wide(1 downto 0) >= n) when G_LANES = 4
-                  else not at_set_end or last_wide(0);
+    lanes(n) <= not at_set_end or to_bit(last_wide(1 downto 0) >= n) when G_LANES = 4
+                else not at_set_end or last_wide(0);
   end generate g_mask;
 
   -- Only windows below C_ROW_MIN can have rows that need padding.
@@ -605,14 +606,26 @@ begin
   load_col      <= std_logic_vector(col(clog2(G_IMG_COLS) - 1 downto 0));
   load_row_odd  <= row(0);
   load_row_end  <= at_col_end;
-  m_valid       <= active;
-  m_row_first   <= row_first;
-  m_plane_first <= plane_first;
-  m_plane_last  <= sample_last;
-  m_plane       <= std_logic_vector(plane_set);
   map_start     <= start_q;
   map_unload    <= flushed;
   map_abort     <= abort_q;
+
+  -- The strobes go far, to as many tables as there are lanes.
+  p_strobes : process (clk)
+  begin
+    if rising_edge(clk) then
+      m_valid       <= active;
+      m_row_first   <= row_first;
+      m_plane_first <= plane_first;
+      m_plane_last  <= sample_last;
+      m_plane       <= std_logic_vector(plane_set);
+      m_lanes       <= lanes;
+      if rst = '1' or command_abort = '1' or event_upset = '1' then
+        m_valid     <= '0';
+        m_row_first <= '0';
+      end if;
+    end if;
+  end process p_strobes;
 
   -- Status -----------------------------------------------------------------------------------------------------------
   -- Counted a clock later: the address generator's tests lie before them. In the clock after an abort it still shows a
@@ -758,7 +771,7 @@ begin
           severity failure;
       end if;
       v_abort := (s_cfg_tvalid = '1' and unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND and s_cfg_tdata(1) = '1')
-                 or (v_abort and (s_pix_tvalid and pix_ready) = '0');
+                 or command_abort = '1' or (v_abort and (s_pix_tvalid and pix_ready) = '0');
       v_waits := rst = '0' and s_pix_tvalid = '1' and pix_ready = '0' and not v_abort;
       v_last  := s_pix_tlast;
     end if;

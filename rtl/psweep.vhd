@@ -5,7 +5,7 @@
 --   Clocks    : from the start command to the last map beat (port tile_clocks), without stalls outside,
 --                 win_cols * win_rows + tile_cols * tile_rows
 --               + ceil(planes / G_LANES) * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
---               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 47 + G_LANES + G_MNCC_W + G_FRAC_W - 3 G_RECTIFIED
+--               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 48 + G_LANES + G_MNCC_W + G_FRAC_W - 3 G_RECTIFIED
 --               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
 --   Numbers   : docs/numeric_contract.md
 --   Lanes     : G_LANES planes (1, 2 or 4) are swept at once over one image buffer and one map, with the same results

@@ -280,6 +280,8 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     run_yosys(commands, work)
     found = json.loads((work / "netlist.json").read_text())
     merged = netlists.merge_output_registers(found)
+    if family == "ecp5":
+        merged += netlists.merge_multiplier_registers(found)
     memories, products = netlists.memories(json.loads((work / "memories.json").read_text()), top, units)
     parts = {}
 
@@ -296,7 +298,7 @@ def synthesise(top, family, hierarchy, no_dsp, rtl, units, work):
     if not counts["lut"] and not counts["ff"] and not any(counts[k] for k in ("ram36", "ram18", "ram48")):
         raise CostError(f"{top}: nothing is left of it after synthesis")
     result = {"counts": counts, "cells": plain(whole), "memories": memories, "products": products,
-              "memory_bits": sum(m["words"] * m["bits"] for m in memories), "registers_in_ram": merged}
+              "memory_bits": sum(m["words"] * m["bits"] for m in memories), "registers_merged": merged}
     if family != "ecp5" and not hierarchy:
         best, histogram = netlists.longest(netlists.Levels(family, found["modules"][top]), units)
         result["levels"] = {"longest": best.pop(""), "by_unit": dict(sorted(best.items())), "histogram": histogram}

@@ -227,13 +227,60 @@ _XILINX_WIDE = (("DO[AB]DO|DOP[AB]DOP", "CLKARDCLK", ("DOA_REG", "DOB_REG"), "1"
 def merge_output_registers(netlist):
     """Registers that do nothing but hold what a block RAM put out become the block's own output register: the devices
     have one, vendor tools use it, Yosys does not. Only registers without enable and reset, all that look at the port.
-    Returns how many FF went. scripts/sim_gates.sh simulates the result."""
+    Returns how many FF went. scripts/sim_gates.sh simulates the result for Virtex-6."""
     return sum(_merge(module) for module in netlist["modules"].values())
 
 
-def _merge(module):
-    cells, sinks, gone = module["cells"], {}, 0
-    for name, cell in cells.items():
+def merge_multiplier_registers(netlist):
+    """ECP5: the registers around a MULT18X18D become its own, likewise. A register in front that others look at, too,
+    stays for them. Returns how many FF went."""
+    gone = 0
+    for module in netlist["modules"].values():
+        cells, driver = module["cells"], {}
+        for name, cell in cells.items():
+            if cell["type"] == "TRELLIS_FF":
+                driver[cell["connections"]["Q"][0]] = name
+        sinks = _sinks(module)
+        for cell in [c for c in cells.values() if c["type"] == "MULT18X18D"]:
+            pins, parameters = cell["connections"], cell["parameters"]
+            used = [port for port, bits in pins.items() if re.fullmatch(r"P\d+", port) and bits and sinks.get(bits[0])]
+            ends = [sinks[pins[port][0]] for port in used]
+            clocks = {tuple(cells[e[0][0]]["connections"]["CLK"]) for e in ends
+                      if e[0][0] in cells and cells[e[0][0]]["type"] == "TRELLIS_FF"}
+            if len(clocks) != 1:
+                continue
+            clock = list(clocks.pop())
+            if not all(len(e) == 1 and _plain(cells, e[0][0], clock) == e[0][1] for e in ends):
+                continue
+            for port, end in zip(used, ends):
+                pins[port] = cells.pop(end[0][0])["connections"]["Q"]
+                gone += 1
+            _clocked(cell, "OUTPUT", clock)
+            # nextpnr has times for all registers or the output's alone.
+            ports = [p for p, bits in pins.items() if re.fullmatch(r"[AB]\d+", p) and isinstance(bits[0], int)]
+            if all(_plain(cells, driver.get(pins[p][0]), clock) for p in ports):
+                for port in ports:
+                    pins[port] = cells[driver[pins[port][0]]]["connections"]["DI"]
+                _clocked(cell, "INPUTA", clock)
+                _clocked(cell, "INPUTB", clock)
+        sinks = _sinks(module)
+        for bit, name in driver.items():
+            if name in cells and not sinks.get(bit):
+                del cells[name]
+                gone += 1
+    return gone
+
+
+def _clocked(cell, part, clock):
+    cell["parameters"].update({f"REG_{part}_CLK": "CLK0", f"REG_{part}_CE": "CE0", f"REG_{part}_RST": "RST0"})
+    cell["connections"].update({"CLK0": clock, "CE0": ["1"], "RST0": ["0"]})
+    cell["port_directions"].update({"CLK0": "input", "CE0": "input", "RST0": "input"})
+
+
+def _sinks(module):
+    """Bit -> (cell, port) of all that look at it; a port of the module is (None, '')."""
+    sinks = {}
+    for name, cell in module["cells"].items():
         for port, bits in cell["connections"].items():
             if cell["port_directions"].get(port, "input") == "input":
                 for bit in bits:
@@ -241,28 +288,37 @@ def _merge(module):
     for port in module["ports"].values():
         for bit in port["bits"]:
             sinks.setdefault(bit, []).append((None, ""))
+    return sinks
 
-    def constant(cell, port, value):
-        return cell["connections"].get(port, [value])[0] in (value, "x")
 
-    def on(value):
-        return value if isinstance(value, str) and not set(value) <= set("01xz") else \
-            int(str(value).replace("x", "0").replace("z", "0"), 2) != 0
-
-    def plain(name, clock):
-        """Data pin of a register without enable and reset, of this clock; else None."""
-        cell = cells[name]
-        pins, parameters = cell["connections"], cell["parameters"]
-        if cell["type"] == "TRELLIS_FF":
-            enabled = parameters.get("CEMUX", "1") == "1" or constant(cell, "CE", "1")
-            good = enabled and constant(cell, "LSR", "0") and parameters.get("CLKMUX", "CLK") == "CLK"
-            return "DI" if good and pins["CLK"] == clock else None
-        if cell["type"] == "FDRE":
-            inverted = any(on(v) for k, v in parameters.items() if k.startswith("IS_"))
-            good = constant(cell, "CE", "1") and constant(cell, "R", "0") and not inverted \
-                and parameters.get("INIT", "x")[-1] != "1"
-            return "D" if good and pins["C"] == clock else None
+def _plain(cells, name, clock):
+    """Data pin of a register without enable and reset, of this clock; else None."""
+    if name not in cells:
         return None
+    cell = cells[name]
+    pins, parameters = cell["connections"], cell["parameters"]
+
+    def constant(port, value):
+        return pins.get(port, [value])[0] in (value, "x")
+    if cell["type"] == "TRELLIS_FF":
+        enabled = parameters.get("CEMUX", "1") == "1" or constant("CE", "1")
+        good = enabled and constant("LSR", "0") and parameters.get("CLKMUX", "CLK") == "CLK"
+        return "DI" if good and pins["CLK"] == clock else None
+    if cell["type"] == "FDRE":
+        inverted = any(_on(v) for k, v in parameters.items() if k.startswith("IS_"))
+        good = constant("CE", "1") and constant("R", "0") and not inverted and parameters.get("INIT", "x")[-1] != "1"
+        return "D" if good and pins["C"] == clock else None
+    return None
+
+
+def _on(value):
+    """A parameter as Yosys writes it: a number as bits, or a text."""
+    text = str(value)
+    return text if not set(text) <= set("01xz") else int(text.replace("x", "0").replace("z", "0"), 2) != 0
+
+
+def _merge(module):
+    cells, sinks, gone = module["cells"], _sinks(module), 0
 
     def ports_of(cell):
         if cell["type"] in ("RAMB18E1", "RAMB36E1") and cell["parameters"].get("RAM_MODE") == "SDP":
@@ -278,9 +334,9 @@ def _merge(module):
             used = [(port, place) for port, bits in pins.items() if re.fullmatch(outputs, port)
                     for place, bit in enumerate(bits) if sinks.get(bit)]
             ends = [sinks[pins[port][place]] for port, place in used]
-            if not used or any(on(cell["parameters"].get(mode, "0")) not in (False, "NOREG") for mode in modes):
+            if not used or any(_on(cell["parameters"].get(mode, "0")) not in (False, "NOREG") for mode in modes):
                 continue
-            if not all(len(e) == 1 and e[0][0] in cells and plain(e[0][0], clock) == e[0][1] for e in ends):
+            if not all(len(e) == 1 and _plain(cells, e[0][0], clock) == e[0][1] for e in ends):
                 continue
             for mode in modes:
                 cell["parameters"][mode] = value

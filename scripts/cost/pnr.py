@@ -11,7 +11,8 @@
     --freq MHZ      what the placer tries for (default 200)
     --json FILE     everything as JSON
 
-Registers behind a RAM that have no enable and no reset become the block's output register, as vendor tools do it. Pins
+Registers behind a RAM, and around a multiplier, that have no enable and no reset become the block's own, as vendor
+tools do it. Pins
 must not limit: all inputs come out of a shift register, all outputs go into registers and from there, one XOR a
 step, to one pin. Debug outputs dbg_* stay open. Results are kept in build/cost/cache.
 """
@@ -137,7 +138,7 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
             cost.run_yosys([f"read_verilog {work}/top.v"] + families.commands("ecp5", "harness", False, work)
                            + [f"write_json {work}/top.json"], work)
             netlist = json.loads((work / "top.json").read_text())
-            merged = netlists.merge_output_registers(netlist)
+            merged = netlists.merge_output_registers(netlist) + netlists.merge_multiplier_registers(netlist)
             (work / "top.json").write_text(json.dumps(netlist))
 
             def one(seed):

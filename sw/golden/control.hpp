@@ -46,9 +46,9 @@ constexpr int kStorageLatency = 4;
 inline int interpolation_latency(const Config& c) { return c.rectified ? 3 : 6; }
 inline int similarity_latency(const Config& c) { return 16 + c.mncc_bits; }
 inline int updating_latency(const Config& c) { return 4 + c.lanes + c.frac_bits; }
-// The start command on s_cfg and in its register, the last plane noticed in the map, the unload command, and four to the
-// first word out of the map.
-constexpr int kControlClocks = 8;
+// The start command on s_cfg and in its register, the strobes' register, the last plane noticed in the map, the unload
+// command, and four to the first word out of the map.
+constexpr int kControlClocks = 9;
 
 // Clocks of a whole tile if neither stream stalls: every pixel, sample and cell takes one clock, one thing after the
 // other, and the pipeline is filled once. engine_clocks() is what port tile_clocks shows: from the start command to the
