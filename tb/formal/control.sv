@@ -49,6 +49,8 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   reg [3:0] i = 0;                                  // sample of the row, then clocks up to 8
   reg [2:0] j = 0;                                  // row of samples
   reg [1:0] set = 0;
+  reg sample = 0, sample_row = 0, sample_plane = 0, sample_last = 0;
+  reg [1:0] sample_set = 0;
   reg [3:0] quiet = 0;                              // clocks since the last sample
   wire [3:0] row_clocks = tile_cols + 2 < 8 ? 8 : tile_cols + 2;
   wire last_pixel = col == win_cols - 1 && row == win_rows - 1;
@@ -100,6 +102,12 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
       if (i == row_clocks - 1) j <= j == tile_rows + 1 ? 0 : j + 1;
       if (last_clock) set <= set + 1;
     end
+    // Strobes come out of registers.
+    sample <= !rst && !abort && state == SWEEP && i < tile_cols + 2;
+    sample_row <= !rst && !abort && state == SWEEP && i == 0;
+    sample_plane <= j == 0;
+    sample_last <= i == tile_cols + 1 && j == tile_rows + 1;
+    sample_set <= set;
     quiet <= m_valid ? 1 : quiet == 15 ? 15 : quiet + 1;
   end
 
@@ -115,12 +123,11 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
       assert (load_valid == taken);
       if (taken) assert (load_col == col && load_row_end == (col == win_cols - 1));
       // Sweep.
-      assert (m_valid == (state == SWEEP && i < tile_cols + 2));
-      assert (m_row_first == (state == SWEEP && i == 0));
+      assert (m_valid == sample && m_row_first == sample_row);
       if (m_valid) begin
-        assert (m_plane_first == (j == 0) && m_plane_last == (i == tile_cols + 1 && j == tile_rows + 1));
-        assert (m_plane == set && set * `LANES < planes && m_lanes[0]);
-        if (`LANES > 1) assert (m_lanes[`LANES - 1] == (set * `LANES + `LANES - 1 < planes));
+        assert (m_plane_first == sample_plane && m_plane_last == sample_last);
+        assert (m_plane == sample_set && sample_set * `LANES < planes && m_lanes[0]);
+        if (`LANES > 1) assert (m_lanes[`LANES - 1] == (sample_set * `LANES + `LANES - 1 < planes));
       end
       if (map_unload) assert (state == FLUSH && quiet > `LATENCY);
       if (tile_done) assert (map_last);
