@@ -25,6 +25,8 @@ POINTS = {
                    "default": True, "flat": ("xc6v",)},
     "tile_4_mul": {"title": "`tile`, four lanes, G_DIVIDER = 1", **TILE, "generics": {"G_LANES": 4, "G_DIVIDER": 1},
                    "default": True, "flat": ("xc6v",)},
+    "tile_mul": {"title": "`tile`, G_DIVIDER = 1", **TILE, "generics": {"G_DIVIDER": 1}, "flat": ("xc6v",)},
+    "tile_split": {"title": "`tile`, G_SPLIT = 1", **TILE, "generics": {"G_SPLIT": 1}, "flat": ("xc6v", "ecp5")},
     "mbit": {"title": "117 x 93 cells, buffer 220 x 106: 1 Mbit", "tile": (117, 93), "default": True, "flat": ("xc6v",),
              "generics": {"G_IMG_COLS": 220, "G_IMG_ROWS": 106, "G_PLANE_COLS": 117, "G_PLANE_ROWS": 93}},
     "integer": {"title": "128 integer depths, 1950 x 1950 pixels, rectified, two lanes", "tile": (256, 130),
@@ -70,6 +72,13 @@ for _line in (pathlib.Path(__file__).resolve().parents[2] / "rtl" / "files.f").r
     if _entity and not _entity.endswith("_pkg"):
         POINTS[f"entity_{_entity}"] = {"title": f"entity {_entity}, generics as by default", "entity": _entity,
                                        "tile": None, "flat": ("xc6v",)}
+
+# Engines that 'make pnr' places in an ECP5-85, whose multipliers have 18 x 18 bits: title, what is changed of `tile`.
+PNR = {
+    "`tile`": ("one lane", {"G_SPLIT": 1}),
+    "`tile`, two lanes": ("two lanes, 256 x 130", {"G_SPLIT": 1, "G_LANES": 2}),
+    "131 x 101 cells, two lanes": ("two lanes, 131 x 101", {"G_SPLIT": 1, **NG_TILE}),
+}
 
 # The paper's table 4 (Virtex-6 xc6vlx240t, ISE 14.7): LUT, FF, RAMB36, DSP.
 PAPER_UNITS = {"control": (115, 51, 0, 0), "address_generator": (498, 427, 1, 0), "storage": (783, 812, 28, 0),
