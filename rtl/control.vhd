@@ -302,6 +302,9 @@ begin
   begin
     if rising_edge(clk) then
       cfg_word     <= s_cfg_tdata;
+      if s_cfg_tvalid = '0' then
+        cfg_word(2 downto 0) <= "000"; -- an upset alone, of these or of cfg_command, commands nothing
+      end if;
       cfg_command  <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
       cfg_low      <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 37)) = 0)
                       and to_bit(unsigned(s_cfg_tdata(36 downto 32)) /= C_COMMAND);

@@ -6,8 +6,8 @@
 --   few      : a clock ago less than half of the places were taken. Who begins beats only while few = '1' and needs at
 --              most 2 ** (G_DEPTH_LOG2 - 1) - 2 clocks from there to s_tvalid need not look at s_tready
 --   Reset    : all places become empty; data have no reset
---   Why so   : a RAM read at the place that will be shown next: a beat that is not taken is read again. Two pointers and
---              a memory of LUTs are smaller than two registers a bit, and there is no enable that all of them hang on
+--   Why so   : a RAM read at the place that will be shown next: a beat that is not taken is read again. Two pointers
+--              and a memory of LUTs are smaller than two registers a bit, and no enable lies before all of them
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;

@@ -44,7 +44,7 @@ POINTS = {
                   "generics": {"G_LANES": 4}, "flat": ("xc5v",)},
     # Rings of rows and map as large as the blocks that are left: G_ROW_SLOTS, G_MAP_DEPTH.
     "chip_ng": {"title": "chip: 131 x 101 cells, buffer 234 x 114, two lanes, rings", "entity": "psweep_top",
-                "tile": (131, 101), "link_mhz": 60, "generics": {**NG_TILE, "G_ROW_SLOTS": 11, "G_MAP_DEPTH": 5984},
+                "tile": (131, 101), "link_mhz": 60, "generics": {**NG_TILE, "G_ROW_SLOTS": 17, "G_MAP_DEPTH": 5984},
                 "flat": ("ng_medium",)},
     "similarity": {"title": "unit similarity of bands", "unit": "similarity", **BANDS, "tile": None,
                    "flat": ("xc6v", "ng_medium"), "quick": ("ng_medium",)},

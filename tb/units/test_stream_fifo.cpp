@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // stream_fifo: nothing lost, doubled or reordered under any stall; full rate and two clocks of latency without stalls;
-// all places used, 'few' and 'more' right, empty after reset. Also proves that the bench parts themselves notice what they are there for.
+// all places used, 'few' and 'more' right, empty after reset. Also proves that the bench parts themselves notice what
+// they are there for.
 #include <deque>
 #include <random>
 

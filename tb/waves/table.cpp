@@ -104,8 +104,8 @@ std::vector<TableRow> compare_cell(const Capture& c, const tb::Stimulus& stimulu
   };
 
   enter("control", "u_control", false, kControlOut, true);
-  add("column of the sample", "col", 0, i, {});
-  add("row of the sample", "row", 0, j, {});
+  add("column of the sample", "col", -1, i, {});  // counted a clock before the strobes
+  add("row of the sample", "row", -1, j, {});
   add("set of planes", "m_plane", 0, c.set, {});
 
   enter("address_generator", "u_address_generator", true, kAddressOut, true);

@@ -336,7 +336,7 @@ TEST_CASE("waves: what is wrong is told") {
       const char *stage, *from, *to, *message;
     } faults[] = {
         {"similarity", "  s9_cell", "  s9_sell", "no signal s9_sell in psweep.g_similarity_n1"},
-        {"updating", "group m 3+lanes", "group m 4+lanes", "the cell is handed on at clock"},
+        {"updating", "group m 4+lanes", "group m 5+lanes", "the cell is handed on at clock"},
         {"storage", "  load_data hex", "  load_data hax", "storage.waves:7: unknown word 'hax'"},
         {"interpolation", "valid bit=4", "valid bit=5", "valid has only 5 bits"},
         {"control", "module u_control", "module u_kontrol", "u_kontrol"},
