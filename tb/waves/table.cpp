@@ -195,7 +195,7 @@ std::vector<TableRow> compare_cell(const Capture& c, const tb::Stimulus& stimulu
   const int64_t address = int64_t{c.cell.row} * t.tile_cols + c.cell.column;
   advance(0, set_begin);
   add("address read", "read_cell", 0, address, {});
-  add_word("before", "word_", 1, c.set > 0);  // the first set ignores what it reads
+  add_word("before", "word_", 2, c.set > 0);  // the first set ignores what it reads
   advance(set_begin, set_end);
   base = c.here[kMapWrite];
   add("address written", "dbg_map_addr", 0, address, {});
