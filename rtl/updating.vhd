@@ -148,8 +148,8 @@ architecture rtl of updating is
   signal write_cell : unsigned(C_ADDR_W - 1 downto 0);
   signal write_word : std_logic_vector(C_WORD_W - 1 downto 0);
 
-  -- Unload: a cell is read, is in the output register of the RAM (fetched), is a beat (sent), and goes into a FIFO. Cells
-  -- are read only while it is less than half full, so none on its way has to wait.
+  -- Unload: a cell is read, is in the RAM's output register (fetched), is a beat (sent), and goes into a FIFO. It is
+  -- read only while that is less than half full, so none on its way has to wait.
   signal unloading    : std_logic; -- cells are left to read
   signal fetch        : std_logic;
   signal read         : std_logic;
