@@ -11,7 +11,7 @@ case ${1:-} in
 esac
 die() { printf 'wave_pictures: %s\n' "$*" >&2; exit 1; }
 [ -x build/psweep-waves ] || die 'build/psweep-waves is missing; make wave-pictures builds it'
-for tool in gtkwave Xvfb xdotool convert; do
+for tool in gtkwave Xvfb xdotool import convert; do
   command -v "$tool" > /dev/null || die "$tool is missing; scripts/setup.sh waves installs it"
 done
 readonly most=80000 # bytes a picture may have
