@@ -116,7 +116,7 @@ dse-slurm-check: setup ## The same on a one-node Slurm of this machine: as root,
 .PHONY: pnr
 pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine (half an hour)   CFG=tile SEEDS=1,2,3
 	@scripts/setup.sh build cost
-	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS))
+	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS)) G_SPLIT=1
 
 .PHONY: ise
 ise: ## Vendor flow, Virtex-5QV and -6: ISE 14.7   BOARD=ml605 TOP=psweep CFG=tile GENERICS='G_X=n ..'

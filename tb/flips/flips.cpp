@@ -197,7 +197,12 @@ class Campaign {
  public:
   Campaign(const std::string& name, const std::vector<Site>& sites, std::unique_ptr<Machine> machine,
            const golden::Config& config, const Options& options)
-      : name_(name), sites_(sites), machine_(std::move(machine)), options_(options), maker_(config, options.seed) {
+      : name_(name),
+        lanes_(config.lanes),
+        sites_(sites),
+        machine_(std::move(machine)),
+        options_(options),
+        maker_(config, options.seed) {
     // Small tiles, so that many upsets can be tried: what control does is the same.
     const int planes = std::min(config.planes, 2 * config.lanes + 1);
     tile_ = maker_.make(Texture::kStereo, Geometry::kInside, 5, 4, planes);
@@ -224,6 +229,14 @@ class Campaign {
       return false;
     }
     if (!options_.only.empty()) return one();
+    // Sites are found by name: one that is not found must not just be left out. (Of a RAM per lane none is found.)
+    for (const char* name : {"u_map.memory", "u_table.memory", "u_offsets.memory"}) {
+      const bool found =
+          std::any_of(sites_.begin(), sites_.end(), [&](const Site& s) { return s.name == std::string(name); });
+      if (found || (lanes_ > 1 && std::string(name) != "u_map.memory")) continue;
+      std::printf("flips: %s: there is no %s to be upset\n", name_.c_str(), name);
+      return false;
+    }
     const auto begun = std::chrono::steady_clock::now();
     std::vector<std::pair<Upset, bool>> upsets;  // and: of a refused tile
     for (size_t n = 0; n < sites_.size(); ++n) {
@@ -381,6 +394,7 @@ class Campaign {
   }
 
   std::string name_;
+  int lanes_;
   const std::vector<Site>& sites_;
   std::unique_ptr<Machine> machine_;
   Options options_;

@@ -17,10 +17,14 @@ my $text = do { local $/; <$i> };
 close $i;
 
 # How often each module is in the engine; modules come before those that use them.
-my (%instance, @uses);
+my (%instance, %parent, @uses);
 while ($text =~ /^module (\w+)\b(.*?)^endmodule/gms) {
   my ($parent, $body) = ($1, $2);
-  while ($body =~ /^  (\w+) (\w+) \(\s*$/mg) { unshift @uses, [$parent, $1]; $instance{$1} = $2 }
+  while ($body =~ /^  (\w+) (\w+) \(\s*$/mg) {
+    unshift @uses, [$parent, $1];
+    $instance{$1} = $2;
+    $parent{$1} = $parent;
+  }
 }
 my %instances = (psweep => 1);
 $instances{$_->[1]} += $instances{$_->[0]} // 0 for @uses;
@@ -35,6 +39,8 @@ sub edit {
   return $body if !defined $entity || $module eq 'psweep' || ($instances{$module} // 0) != 1;
   # Common cells are known by what they are in their only instance.
   my $where = $entity =~ /^(divider|delay_line|stream_fifo|ram_)/ ? "$instance{$module}." : '';
+  # A part of a ram_deep is known by what the whole is.
+  $where = "$instance{$parent{$module}}." if $where =~ /u_part\.$/;
   # Signals of the VHDL by the register behind them.
   my %name;
   while ($body =~ /assign (\w+) = (n\d+_q);/g) { $name{$2} = $1 if !$name{$2} || $name{$2} =~ /^\w+_q$/ }
