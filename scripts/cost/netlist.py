@@ -211,8 +211,8 @@ class Levels:
 
 
 # Read ports of block RAMs: outputs, clock, parameters that switch the output register on, their value, its enables.
-_XILINX = (("DO[A]D?O?|DOPA(DOP)?", r"CLKA(RDCLK)?", ("DOA_REG",), "1", ("REGCEA(REGCE)?",)),
-           ("DO[B]D?O?|DOPB(DOP)?", r"CLKB(WRCLK)?", ("DOB_REG",), "1", ("REGCEB",)))
+_XILINX = (("DOA(DO)?|DOPA(DOP)?", "CLKA(RDCLK)?", ("DOA_REG",), "1", ("REGCEA(REGCE)?",)),
+           ("DOB(DO)?|DOPB(DOP)?", "CLKB(WRCLK)?", ("DOB_REG",), "1", ("REGCEB",)))
 _XILINX_SDP = (("DOP?", "RDCLK", ("DO_REG",), "1", ("REGCE",)),)
 READ_PORTS = {
     "DP16KD": ((r"DOA\d+", "CLKA", ("REGMODE_A",), "OUTREG", ()), (r"DOB\d+", "CLKB", ("REGMODE_B",), "OUTREG", ())),
