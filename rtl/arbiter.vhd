@@ -189,6 +189,12 @@ architecture rtl of arbiter is
   signal run_tile       : std_logic_vector(15 downto 0);
   signal failed         : std_logic;
   signal failed_tile    : std_logic_vector(15 downto 0);
+  signal tile_failed    : std_logic;
+  signal row_lost       : std_logic;
+  signal map_lost       : std_logic;
+  signal lost           : std_logic;
+  signal starved        : std_logic;
+  signal recovered      : std_logic;
   signal engine_wait    : std_logic;
   signal events         : std_logic_vector(31 downto 0);
   signal ev_sent        : std_logic;
@@ -538,7 +544,10 @@ begin
       open_tile   => row_open,
       open_pixels => row_pixels,
       open_chunks => row_chunks,
+      fail        => tile_failed,
+      recovered   => row_lost,
       busy        => row_busy,
+      staged      => staged,
       base        => row_base,
       received    => row_received,
       w_check     => w_check,
@@ -577,27 +586,19 @@ begin
       cfg_tdata   => m_cfg_tdata,
       engine_busy => engine_busy,
       map_last    => map_last,
+      starved     => starved,
+      lost        => lost,
       go          => go,
       running     => running,
       run_tile    => run_tile,
       failed      => failed,
-      failed_tile => failed_tile
+      failed_tile => failed_tile,
+      tile_failed => tile_failed,
+      recovered   => recovered
     );
 
-  -- From START until the scheduler has launched it.
-  p_staged : process (clk)
-  begin
-    if rising_edge(clk) then
-      if row_open = '1' then
-        staged <= '1';
-      elsif go = '1' then
-        staged <= '0';
-      end if;
-      if rst = '1' or stop = '1' then
-        staged <= '0';
-      end if;
-    end if;
-  end process p_staged;
+  lost    <= row_lost or map_lost;
+  starved <= m_pix_tready and not row_busy;
 
   u_map_buffer : entity work.map_buffer
     generic map (
@@ -615,6 +616,8 @@ begin
       s_tlast     => s_map_tlast,
       release_map => map_release,
       clear       => map_clear,
+      fail        => tile_failed,
+      recovered   => map_lost,
       keep        => map_keep,
       started     => map_started,
       busy        => map_busy,
