@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> [-D BOTH_EDGES=ON]
-#       [-D EDIT=<perl script> -D NOTES=<its third file>] -P VhdlToVerilog.cmake
+#       [-D EDIT=<Perl or Python script> -D NOTES=<its third file>] -P VhdlToVerilog.cmake
 # Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
 # Shows GHDL's messages if it fails or warns; its notes ("found RAM ..") are left out, as is the warning that attributes
 # for the FPGA tools do not reach the Verilog.
@@ -26,7 +26,11 @@ endfunction()
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${SOURCES})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
 if(EDIT)
-  execute_process(COMMAND perl ${EDIT} ${DIR}/raw.v ${DIR}/edited.v ${NOTES} RESULT_VARIABLE code)
+  set(interpreter perl)
+  if(EDIT MATCHES "\\.py$")
+    set(interpreter python3)
+  endif()
+  execute_process(COMMAND ${interpreter} ${EDIT} ${DIR}/raw.v ${DIR}/edited.v ${NOTES} RESULT_VARIABLE code)
   if(NOT code EQUAL 0)
     message(FATAL_ERROR "${EDIT} failed")
   endif()
