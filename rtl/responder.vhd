@@ -48,7 +48,8 @@ entity responder is
     pin_speed_100   : in  std_logic;
     full_duplex     : out std_logic;
     session         : out std_logic;
-    events          : out std_logic_vector(31 downto 0);
+    events          : out std_logic_vector(39 downto 0);
+    tick_ms         : out std_logic; -- pulse each millisecond of clk
 
     -- packet_rx
     m_valid  : in  std_logic;
@@ -71,6 +72,7 @@ entity responder is
     peer_bank  : out std_logic;
     peer_index : out std_logic_vector(3 downto 0);
     peer_data  : out std_logic_vector(7 downto 0);
+    tx_abort   : out std_logic;
 
     -- row_buffer
     row_clear    : out std_logic;
@@ -953,6 +955,8 @@ begin
 
   events(15 downto 0)  <= (others => '0');
   events(21 downto 18) <= (others => '0');
-  events(31 downto 29) <= (others => '0');
+  events(39 downto 29) <= (others => '0');
+  tick_ms              <= ms_tick;
+  tx_abort             <= '0';
 
 end architecture rtl;
