@@ -523,7 +523,7 @@ begin
       s_start      => s_start,
       s_kind       => s_kind,
       s_bank       => s_bank,
-      abort        => tx_abort,
+      s_abort      => tx_abort,
       p_valid      => p_valid,
       p_ready      => p_ready,
       p_data       => p_data,

@@ -235,6 +235,9 @@ begin
           icmp <= not s_data(4) and not arp;
         end if;
       end if;
+      if rst = '1' or verdict = '1' then
+        arp <= '0';
+      end if;
       if rst = '1' or (fire = '1' and s_last = '1') then
         pos  <= C_FIRST;
         near <= '1';
