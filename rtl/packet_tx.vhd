@@ -332,7 +332,7 @@ begin
       way_place    <= place;
       way_checksum <= at_checksum;
       way_no_zero  <= not round(1);
-      way_clear    <= to_bit(round = 2 and place = 0);
+      way_clear    <= walking and to_bit(round = 2 and place = 0);
       if round = 0 then
         way_add <= (udp and to_bit(place >= 14 and place <= 39)) or
                    (kind(1) and kind(0) and to_bit(place(5 downto 1) = 17));

@@ -386,6 +386,10 @@ TEST_CASE("mac_tx: a slot out of turn is served, and from then on turns are righ
     const unsigned before = bench.dut.resynchronised;
     if (round % 2) {  // what comes next is for the slot that is not served next
       bench.skip_turn();
+      const Bytes alone = random_frame(random, 60);
+      bench.send({alone});
+      REQUIRE(bench.bursts.size() == 1);
+      CHECK(bench.bursts[0].nibbles == transmit_nibbles(alone));
     }
     std::vector<Bytes> frames;
     for (int i = 0; i < 1 + round % 5; ++i) frames.push_back(random_frame(random, 60 + random() % 20));

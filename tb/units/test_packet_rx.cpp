@@ -426,7 +426,7 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
       }
     }
   }
-  CHECK(bench->outcomes.compared() > 1700);
+  CHECK(bench->outcomes.compared() > 1400);
   // A good frame after all that.
   bench->send(bench->closed(bench->udp(9)), 0, kGoodUdp);
   bench->finish();
@@ -517,6 +517,8 @@ TEMPLATE_TEST_CASE("packet_rx: collision fragments are counted apart from short 
       bench->finish();
     }
   }
+  bench->send(bench->closed(bench->udp(9)), 0, kGoodUdp);
+  bench->finish();
   bench->check();
   CHECK(bench->count[golden::kEventFragment] == 2);
   CHECK(bench->count[net::kRxShort] == 4 + 2);
@@ -727,7 +729,10 @@ TEMPLATE_TEST_CASE("packet_rx: random and mutated frames", "", Vpacket_rx_2, Vpa
   while (!bench->queue.empty()) {
     bench->max_hold = bench->below(3) == 0 ? 12000 : 0;
     bench->gaps = bench->below(4) * 0.25;
-    if (bench->next == 0 && bench->pulses.empty()) bench->dut.half_duplex = bench->below(2) != 0;
+    if (bench->gaps > 0) {
+      bench->sim.run_until([&] { return bench->next == 0 && bench->pulses.empty(); });
+      bench->dut.half_duplex = bench->below(2) != 0;
+    }
     bench->sim.run(3000);
   }
   bench->finish();
@@ -841,13 +846,14 @@ TEST_CASE("packet_rx: after an upset of any register the ring is empty soon, and
   uint64_t wrong = 0, upsets = 0, ring = 0;
   for (size_t site = 0; site < kSites.size(); ++site) {
     for (int bit = 0; bit < kSites[site].bits; ++bit) {
-      for (int round = 0; round < 4; ++round) {
+      for (int round = 0; round < 8; ++round) {
         INFO(kSites[site].name << ", bit " << bit << ", round " << round);
         // A busy ring, or (every fourth time) an idle one.
-        bench.most_hold = round == 0 ? 1 : 400;
+        bench.most_hold = round % 4 == 0 ? 1 : 400;
         const uint32_t first = number;
-        for (int i = 0; i < (round == 3 ? 0 : 6); ++i) bench.send(number++, 4 + bench.random() % (i % 3 ? 30 : 1100));
-        bench.sim.run(bench.random() % (round == 3 ? 20 : 2000));
+        for (int i = 0; i < (round % 4 == 3 ? 0 : 6); ++i)
+          bench.send(number++, 4 + bench.random() % (i % 3 ? 30 : 1100));
+        bench.sim.run(bench.random() % (round % 4 == 3 ? 20 : 2000));
         bench.dut.flip_site = static_cast<uint16_t>(site + 1);
         bench.dut.flip_mask = uint64_t{1} << bit;
         bench.sim.tick();
@@ -861,7 +867,9 @@ TEST_CASE("packet_rx: after an upset of any register the ring is empty soon, and
         }
         REQUIRE(quiet == 30);
         wrong += bench.taken.size() != number - first;
-        // From now on every frame is a message, in order.
+        // One frame more may be judged by what was upset. From then on every frame is a message, in order.
+        bench.send(number++, 4);
+        bench.sim.run(600);
         bench.taken.clear();
         const uint32_t second = number;
         for (int i = 0; i < 3; ++i) bench.send(number++, i == 1 ? 1100 : 4);
