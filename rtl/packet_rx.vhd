@@ -24,10 +24,11 @@
 --               its kind; kind 3: 0 and 9). Order: the MAC's verdict (8, 5, 4, 3 or, in half duplex with a wrong FCS,
 --               17, 2, 1), 6 destination MAC, 9 ethertype or ARP, 10 IP header, 16 source, 11 fragment, 9 protocol or
 --               ICMP type, 12 UDP length or checksum, 7 no slot
---   Upsets    : messages are counted besides; without one the reader's pointer follows the writer's, and a frame begins
---               where the writer is. The lap is kept with a message, too: one that is not of the reader's lap was
---               there before the pointer was upset; then nothing waits any more. So whatever is upset, at most as
---               many wrong messages are shown as there are granules, and with an empty ring all is right again
+--   Upsets    : a message says how many granules it has (1 to 3) and in which lap it was written. One of no granules or
+--               of another lap than the reader's was there before a pointer was upset, and more granules in use than
+--               there are mean the same: then nothing waits any more (resynchronised). So whatever is upset, the reader
+--               moves towards the writer with each message, shows at most as many wrong ones as there are granules, and
+--               with an empty ring all is right again
 --   Latency   : m_valid 3 clocks behind the verdict
 --   Structure : one position counter. It starts at -34, so that it counts the bytes behind the IP header without a
 --               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and
@@ -40,7 +41,7 @@
 --               The ring is addressed with the position, too: granule of the frame + its upper two bits, mod
 --               granules. So the first 34 bytes (position -34 .. -1) are the last 34 of the granule before, which no
 --               frame uses for its own end: the next one is taken at frame byte 512, position 478. Pointers are granule
---               numbers with one bit more; kind, length and next granule of a message are kept under its granule
+--               numbers with one bit more, the lap; kind, length and granules of a message are kept under its first one
 --   Reset     : no message, next byte is the first of a frame; RAM and data registers have no reset
 --   Golden    : sw/golden/packet_rx.hpp
 library ieee;
@@ -171,14 +172,14 @@ architecture rtl of packet_rx is
   signal store      : std_logic;                        -- a byte of a frame
   signal crossing   : std_logic;                        -- it is the first of a granule
   signal write_head : unsigned(C_RING_W downto 0);      -- of the frame that comes in
-  signal write_tail : unsigned(C_RING_W downto 0);      -- the granule behind what it has so far
   signal read_head  : unsigned(C_RING_W downto 0);      -- of the oldest message
-  signal tail_now   : unsigned(C_RING_W downto 0);      -- write_tail, or where a frame begins
-  signal waiting    : unsigned(C_RING_W downto 0);      -- messages
-  signal none       : std_logic;                        -- no message
+  signal used       : unsigned(C_RING_W downto 0);      -- by messages
+  signal taken      : unsigned(1 downto 0);             -- by the frame so far
+  signal taken_now  : unsigned(1 downto 0);             -- the same, none before its first one
+  signal in_use     : unsigned(C_RING_W downto 0);
+  signal broken     : std_logic;                        -- more used than there are
   signal shown      : std_logic;
   signal stale      : std_logic;                        -- what is shown is no message
-  signal full       : std_logic;
   signal room       : std_logic;                        -- all bytes of the frame so far had room
   signal room_now   : std_logic;
 
@@ -193,8 +194,8 @@ architecture rtl of packet_rx is
 
   signal info_waddr   : std_logic_vector(C_RING_W - 1 downto 0);
   signal info_raddr   : std_logic_vector(C_RING_W - 1 downto 0);
-  signal info_write   : std_logic_vector(C_RING_W + 14 downto 0);
-  signal info_read    : std_logic_vector(C_RING_W + 14 downto 0);
+  signal info_write   : std_logic_vector(15 downto 0);
+  signal info_read    : std_logic_vector(15 downto 0);
   signal reply_length : unsigned(10 downto 0);
 
   -- Frame byte n, as place.
@@ -522,7 +523,7 @@ begin
       if verdict = '0' then
         events(17 downto 0) <= (others => '0');
       end if;
-      events(18) <= (none and to_bit(read_head /= write_head)) or stale;
+      events(18) <= broken or stale;
       if rst = '1' then
         events(18) <= '0';
       end if;
@@ -532,47 +533,40 @@ begin
   -- Ring --------------------------------------------------------------------------------------------------------------
   store    <= fire and not s_last;
   crossing <= store and to_bit(pos(8 downto 0) = C_FIRST(8 downto 0));
-  tail_now <= write_head when near = '1' else write_tail;
-  none     <= to_bit(waiting = 0);
-  full     <= to_bit(tail_now(C_RING_W - 1 downto 0) = read_head(C_RING_W - 1 downto 0)) and
-              (tail_now(C_RING_W) xor read_head(C_RING_W));
-  room_now <= not full and (near or room) when crossing = '1' else -- near: the first granule
+  used     <= write_head - read_head;
+  broken   <= used(C_RING_W) and to_bit(used(C_RING_W - 1 downto 0) /= 0);
+  room_now <= not in_use(C_RING_W) and (near or room) when crossing = '1' else -- near: the first granule
               room;
+
+  taken_now <= "00" when near = '1' else taken;
+  in_use    <= used + taken_now;
 
   p_ring : process (clk)
   begin
     if rising_edge(clk) then
       room <= room_now;
       if crossing = '1' then
-        write_tail <= tail_now + 1;
+        taken <= taken_now + 1;
       end if;
       if commit = '1' then
-        write_head <= write_tail;
+        write_head <= write_head + taken;
       end if;
-      if none = '1' or stale = '1' then
+      if broken = '1' or stale = '1' then
         read_head <= write_head;
       elsif m_done = '1' then
-        read_head <= unsigned(info_read(C_RING_W + 13 downto 13));
+        read_head <= read_head + unsigned(info_read(14 downto 13));
       end if;
-      if none = '1' or stale = '1' then
-        waiting    <= (others => '0');
-        waiting(0) <= commit;
-      elsif commit = '1' and m_done = '0' then
-        waiting <= waiting + 1;
-      elsif commit = '0' and m_done = '1' then
-        waiting <= waiting - 1;
-      end if;
-      shown <= not none and not m_done and not stale; -- info_read follows read_head by one clock
+      -- info_read follows read_head by one clock.
+      shown <= to_bit(used /= 0) and not m_done and not broken and not stale;
       if rst = '1' then
         write_head <= (others => '0');
         read_head  <= (others => '0');
-        waiting    <= (others => '0');
         shown      <= '0';
       end if;
     end if;
   end process p_ring;
 
-  stale   <= shown and (info_read(C_RING_W + 14) xor read_head(C_RING_W));
+  stale   <= shown and ((info_read(15) xor read_head(C_RING_W)) or not (info_read(14) or info_read(13)));
   m_valid <= shown and not stale;
 
   -- A frame that is longer than 1569 bytes would come to the granule before its own once more.
@@ -610,12 +604,12 @@ begin
 
   info_waddr <= std_logic_vector(write_head(C_RING_W - 1 downto 0));
   info_raddr <= std_logic_vector(read_head(C_RING_W - 1 downto 0));
-  info_write <= write_head(C_RING_W) & std_logic_vector(write_tail) & udp & (icmp or (udp and closed)) &
+  info_write <= write_head(C_RING_W) & std_logic_vector(taken) & udp & (icmp or (udp and closed)) &
                 std_logic_vector(reply_length);
 
   u_info : entity work.ram_sdp
     generic map (
-      G_DATA_W  => C_RING_W + 15,
+      G_DATA_W  => 16,
       G_DEPTH   => 4 * G_SLOTS,
       G_LATENCY => 1
     )
