@@ -26,7 +26,8 @@
 --               ICMP type, 12 UDP length or checksum, 7 no slot
 --   Upsets    : a message says how many granules it has (1 to 3) and in which lap it was written. One of no granules or
 --               of another lap than the reader's was there before a pointer was upset, and more granules in use than
---               there are mean the same: then nothing waits any more (resynchronised). So whatever is upset, the reader
+--               there are mean the same: then the ring begins anew, empty, without the frame that is just coming in
+--               (resynchronised). So whatever is upset, the reader
 --               moves towards the writer with each message, shows at most as many wrong ones as there are granules, and
 --               with an empty ring all is right again
 --   Latency   : m_valid 3 clocks behind the verdict
@@ -81,6 +82,7 @@ end entity packet_rx;
 architecture rtl of packet_rx is
 
   constant C_RING_W : integer := clog2(4 * G_SLOTS); -- bits of a granule number
+  constant C_RING_END : unsigned(C_RING_W - 2 downto 0) := (others => '1');
   constant C_HEADER : integer := 34; -- bytes up to the end of the IP header: position 0 is frame byte 34
   constant C_FIRST  : unsigned(10 downto 0) := to_unsigned(2048 - C_HEADER, 11);
   constant C_PORT   : unsigned(15 downto 0) := to_unsigned(G_UDP_PORT mod 65536, 16);
@@ -109,6 +111,7 @@ architecture rtl of packet_rx is
 
   -- One clock later: the data, what it should be, and to what class it belongs.
   signal got          : std_logic;
+  signal near_q       : std_logic; -- the flags below mean this byte
   signal verdict      : std_logic; -- data is the verdict
   signal data         : std_logic_vector(7 downto 0);
   signal want         : std_logic_vector(7 downto 0);
@@ -176,7 +179,7 @@ architecture rtl of packet_rx is
   signal used       : unsigned(C_RING_W downto 0);      -- by messages
   signal taken      : unsigned(1 downto 0);             -- by the frame so far
   signal taken_now  : unsigned(1 downto 0);             -- the same, none before its first one
-  signal in_use     : unsigned(C_RING_W downto 0);
+  signal full       : std_logic;                        -- all in use, by the frame, too
   signal broken     : std_logic;                        -- more used than there are
   signal shown      : std_logic;
   signal stale      : std_logic;                        -- what is shown is no message
@@ -343,25 +346,26 @@ begin
       data    <= s_data;
       want    <= want_next;
 
-      of_mac       <= near and to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
-      of_type      <= near and (at_byte(place, 12) or at_byte(place, 13) or
+      near_q       <= near;
+      of_mac       <= to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
+      of_type      <= at_byte(place, 12) or at_byte(place, 13) or
                       (arp and (to_bit(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
-                                to_bit(place(5 downto 2) = "0001"))));
-      of_head      <= near and (at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111"));
-      of_fragment  <= near and (at_byte(place, 20) or at_byte(place, 21));
-      of_kind      <= near and (at_byte(place, 23) or (icmp and to_bit(place(5 downto 1) = "00000")));
-      of_port      <= near and udp and to_bit(place(5 downto 1) = "00001");
-      of_length    <= near and udp and to_bit(place(5 downto 1) = "00010");
-      of_checksum  <= near and udp and to_bit(place(5 downto 1) = "00011");
+                                to_bit(place(5 downto 2) = "0001")));
+      of_head      <= at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111");
+      of_fragment  <= at_byte(place, 20) or at_byte(place, 21);
+      of_kind      <= at_byte(place, 23) or (icmp and to_bit(place(5 downto 1) = "00000"));
+      of_port      <= udp and to_bit(place(5 downto 1) = "00001");
+      of_length    <= udp and to_bit(place(5 downto 1) = "00010");
+      of_checksum  <= udp and to_bit(place(5 downto 1) = "00011");
       only_low     <= at_byte(place, 20) and not arp;
       only_high    <= at_byte(place, 16) and not arp;
       takes_length <= near and at_byte(place, 17);
-      of_group     <= near and (at_byte(place, 6) or (arp and at_byte(place, 22)));
-      of_net       <= near and at_byte(place, 26) and not arp;
+      of_group     <= at_byte(place, 6) or (arp and at_byte(place, 22));
+      of_net       <= at_byte(place, 26) and not arp;
       of_first     <= at_byte(place, 6) or (arp and (at_byte(place, 22) or at_byte(place, 28))) or
                       (at_byte(place, 26) and not arp);
-      of_last      <= near and (at_byte(place, 11) or (arp and (at_byte(place, 27) or at_byte(place, 31))) or
-                                (at_byte(place, 29) and not arp));
+      of_last      <= at_byte(place, 11) or (arp and (at_byte(place, 27) or at_byte(place, 31))) or
+                      (at_byte(place, 29) and not arp);
 
       add_head   <= header and to_bit(place >= 44);
       add_body   <= not near or to_bit(place = 46 or place = 47 or place >= 56 or place < 8);
@@ -381,7 +385,7 @@ begin
   p_wrong : process (clk)
   begin
     if rising_edge(clk) then
-      if got = '1' then
+      if got = '1' and near_q = '1' then
         not_mine     <= not_mine or (of_mac and differs);
         not_all      <= not_all or (of_mac and to_bit(data /= x"ff"));
         bad_type     <= bad_type or (of_type and differs);
@@ -535,11 +539,12 @@ begin
   crossing <= store and to_bit(pos(8 downto 0) = C_FIRST(8 downto 0));
   used     <= write_head - read_head;
   broken   <= used(C_RING_W) and to_bit(used(C_RING_W - 1 downto 0) /= 0);
-  room_now <= not in_use(C_RING_W) and (near or room) when crossing = '1' else -- near: the first granule
+  room_now <= not full and (near or room) when crossing = '1' else -- near: the first granule
               room;
 
   taken_now <= "00" when near = '1' else taken;
-  in_use    <= used + taken_now;
+  full      <= used(C_RING_W) or (to_bit(used(C_RING_W - 1 downto 1) = C_RING_END) and
+                                  (taken_now(1) or (taken_now(0) and used(0))));
 
   p_ring : process (clk)
   begin
@@ -551,14 +556,13 @@ begin
       if commit = '1' then
         write_head <= write_head + taken;
       end if;
-      if broken = '1' or stale = '1' then
-        read_head <= write_head;
-      elsif m_done = '1' then
+      if m_done = '1' then
         read_head <= read_head + unsigned(info_read(14 downto 13));
       end if;
       -- info_read follows read_head by one clock.
-      shown <= to_bit(used /= 0) and not m_done and not broken and not stale;
-      if rst = '1' then
+      shown <= to_bit(used /= 0) and not m_done;
+      if rst = '1' or broken = '1' or stale = '1' then
+        room       <= '0';
         write_head <= (others => '0');
         read_head  <= (others => '0');
         shown      <= '0';
