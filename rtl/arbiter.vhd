@@ -186,7 +186,7 @@ architecture rtl of arbiter is
   signal f_take         : std_logic;
   signal f_data         : std_logic_vector(7 downto 0);
   signal f_last         : std_logic;
-  signal c_index        : std_logic_vector(4 downto 0);
+  signal c_index        : std_logic_vector(5 downto 0);
   signal c_valid        : std_logic;
   signal c_data         : std_logic_vector(31 downto 0);
   signal job_we         : std_logic;
@@ -360,6 +360,7 @@ begin
       s_start         => s_start,
       s_kind          => s_kind,
       s_bank          => s_bank,
+      tx_abort        => tx_abort,
       p_valid         => p_valid,
       p_ready         => p_ready,
       p_data          => p_data,
@@ -368,7 +369,6 @@ begin
       peer_bank       => peer_bank,
       peer_index      => peer_index,
       peer_data       => peer_data,
-      tx_abort        => tx_abort,
       row_clear       => row_clear,
       row_open        => row_open,
       row_pixels      => row_pixels,
@@ -428,12 +428,12 @@ begin
 
   u_counters : entity work.counters
     generic map (
-      G_COUNT => 32
+      G_COUNT => 40
     )
     port map (
       clk     => clk,
       rst     => rst,
-      events  => events(31 downto 0),
+      events  => events,
       r_index => c_index,
       r_valid => c_valid,
       r_data  => c_data
