@@ -160,7 +160,8 @@ void Client::check_silence(const std::string& outstanding) {
   std::string text = where() + ": no valid answer for " + seconds(silent) + "; outstanding: " + outstanding;
   if (!transport_.complaint().empty()) text += " (" + transport_.complaint() + ")";
   if (other_versions_ > 0) text += "; answers came in version " + std::to_string(other_version_) + " of the protocol";
-  const std::string cut = fragments();
+  // Small packets may get through when large ones do not.
+  const std::string cut = now() - latest_ <= timeout_ ? fragments() : "";
   if (!cut.empty()) text += "; " + cut;
   throw LinkError(text);
 }
@@ -304,7 +305,7 @@ std::optional<Event> Client::take(const Bytes& packet) {
     statistics_.rtt_min = std::min(statistics_.rtt_min, trip);
     statistics_.rtt_max = std::max(statistics_.rtt_max, trip);
   }
-  heard_ = now();
+  heard_ = latest_ = now();
   ever_heard_ = true;
   backoff_ = 1;
   return r;

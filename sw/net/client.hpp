@@ -157,8 +157,9 @@ class Client {
   std::optional<Capabilities> capabilities_;
   uint16_t sequence_ = 0;
   uint64_t order_ = 0;
-  std::vector<Sent> sent_;  // by sequence
-  double heard_ = 0, asked_ = 0;
+  std::vector<Sent> sent_;        // by sequence
+  double heard_ = 0, asked_ = 0;  // heard_: of what is asked now; latest_: of anything
+  double latest_ = 0;
   bool ever_heard_ = false, brief_ = false;
   int other_version_ = 0, other_versions_ = 0;  // the latest, and how many packets
   std::vector<uint32_t> first_counters_;
