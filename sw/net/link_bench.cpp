@@ -10,6 +10,9 @@ namespace {
 constexpr int kWindow = 32, kAnswerEvery = 8;  // WRITEs
 constexpr uint16_t kSwept = 0, kOpened = 1;    // tiles
 
+// Bytes of wire that a payload takes: headers, FCS, preamble, gap; short frames are filled up.
+size_t on_wire(size_t payload) { return std::max<size_t>(payload + 42, 60) + 4 + 8 + 12; }
+
 }  // namespace
 
 LinkBench::LinkBench(Client& client, const Capabilities& chip) : client_(client), c_(chip.config) {
@@ -46,6 +49,10 @@ LinkBench::LinkBench(Client& client, const Capabilities& chip) : client_(client)
   const auto cells = static_cast<uint32_t>(job_.tile_cols * job_.tile_rows),
              per = static_cast<uint32_t>(c_.chunk_cells());
   map_chunks_ = (cells + per - 1) / per;
+  for (uint32_t c = 0; c < map_chunks_; ++c) {
+    map_wire_ += on_wire(kHeaderBytes + static_cast<size_t>(std::min(per, cells - c * per)) * c_.cell_bytes());
+  }
+  map_wire_ = std::max(map_wire_, 2 * on_wire(kHeaderBytes + chunk_.size()));
 }
 
 LinkRates LinkBench::measure(bool up, bool down, double seconds) {
@@ -67,6 +74,10 @@ LinkRates LinkBench::measure(bool up, bool down, double seconds) {
     map_heard = client_.now();
   };
   if (down) ask_map();
+  // Both at once: a READ waits behind the rows in this side's queue, so it goes in between them, one for as many of
+  // them as take the time of a map. In half duplex the queue is short.
+  const bool paced = up && down && !half_duplex_;
+  size_t ahead = 0;
   while (client_.now() < end || !asked.empty()) {
     const bool sending = client_.now() < end;
     while (up && sending && static_cast<int>(asked.size() + 1) * kAnswerEvery <= window) {
@@ -76,6 +87,11 @@ LinkRates LinkBench::measure(bool up, bool down, double seconds) {
             client_.send(kWrite, kOpened, static_cast<uint16_t>(next), chunk_, flag ? kFlagAnswer : 0);
         if (flag) asked.push_back(order);
         next = (next + 1) % usable_;
+        ahead += on_wire(kHeaderBytes + chunk_.size());
+        if (paced && ahead >= map_wire_) {
+          ahead -= map_wire_;
+          ask_map();
+        }
       }
       rates.chunks_sent += kAnswerEvery;
     }
@@ -99,7 +115,7 @@ LinkRates LinkBench::measure(bool up, bool down, double seconds) {
         down_end = now;
       }
       // The next READ arrives while the end of this one is on its way.
-      if (down && sending && m->order == read && uint32_t{m->index} + 2 >= map_chunks_) ask_map();
+      if (down && sending && !paced && m->order == read && uint32_t{m->index} + 2 >= map_chunks_) ask_map();
     } else {
       heard = now;
       const auto& reply = std::get<Reply>(*event);

@@ -41,6 +41,7 @@ class LinkBench {
   Bytes chunk_;          // of rows
   uint32_t usable_ = 0;  // chunks of the second tile that may be sent
   uint32_t map_chunks_ = 0;
+  size_t map_wire_ = 0;  // bytes of wire that the map takes, at least two chunks of rows
   bool half_duplex_ = false;
 };
 

@@ -21,6 +21,7 @@ constexpr int kMostRefusals = 64;       // of one session, beyond what reorderin
 constexpr int kMostNowhere = 8;         // status blocks in a row without a trace of a started tile
 constexpr int kMostStill = 64;          // status blocks in a row in which nothing moves, and no tile is swept
 constexpr int kMostFruitlessOpens = 8;  // sessions in a row that brought no tile
+constexpr int kMostTableRefusals = 4;   // of a plane table
 constexpr int kMostTries = 3;           // of one tile
 
 class Pump {
@@ -639,6 +640,7 @@ bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
   const auto writes = golden::table_writes(table);
   const size_t per = static_cast<size_t>(c.chunk_bytes) / 4;
   const double start = client.now();
+  int refused = 0;
   for (size_t first = 0; first < writes.size(); first += per) {
     Bytes payload;
     for (size_t i = first; i < std::min(first + per, writes.size()); ++i) append32(payload, writes[i].value);
@@ -646,6 +648,8 @@ bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
       const Reply r = client.request(kTable, 1, static_cast<uint16_t>(first), payload);
       if (r.code == kOk) break;
       if (r.code == kBusy || r.code == kNoSession) return false;
+      // It may have been damaged on its way.
+      if (r.code == kBadMessage && ++refused < kMostTableRefusals) continue;
       // The engine may need a moment to drop what an older session left.
       if (r.code != kNotReady || client.now() - start > client.timeout()) {
         throw LinkError(client.where() + ": the plane table was refused: " + code_name(r.code));
