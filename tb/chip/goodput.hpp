@@ -15,7 +15,9 @@ struct Goodput {
   double worst() const { return std::max(std::abs(apart(bench.up, wire_up)), std::abs(apart(bench.down, wire_down))); }
 };
 
-inline Goodput goodput(Desk& desk, uint16_t chip_port, net::LinkBench& bench, bool up, bool down, double seconds) {
+// slow: so many times faster goes the clock that the bench sees.
+inline Goodput goodput(Desk& desk, uint16_t chip_port, net::LinkBench& bench, bool up, bool down, double seconds,
+                       double slow = 1) {
   struct Flow {
     Time first = -1, last = 0;
     uint64_t bytes = 0;
@@ -38,7 +40,7 @@ inline Goodput goodput(Desk& desk, uint16_t chip_port, net::LinkBench& bench, bo
     if (from_chip && h->type == net::kMap && desk.now() <= end) maps.add(desk.now(), p->payload.size());
   };
   Goodput g;
-  g.bench = bench.measure(up, down, seconds);
+  g.bench = bench.measure(up, down, seconds * slow);
   desk.on_wire = nullptr;
   g.wire_up = writes.rate();
   g.wire_down = maps.rate();
