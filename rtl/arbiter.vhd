@@ -127,13 +127,14 @@ architecture rtl of arbiter is
   signal rx_events      : std_logic_vector(15 downto 0);
   signal full_duplex    : std_logic;
   signal duplex_q       : std_logic;
-  signal msg_events     : std_logic_vector(31 downto 0);
+  signal msg_events     : std_logic_vector(39 downto 0);
   signal pins           : std_logic_vector(1 downto 0);
   signal pins_q         : std_logic_vector(1 downto 0);
   signal s_ready        : std_logic;
   signal s_start        : std_logic;
   signal s_kind         : std_logic_vector(1 downto 0);
   signal s_bank         : std_logic;
+  signal tx_abort       : std_logic;
   signal p_valid        : std_logic;
   signal p_ready        : std_logic;
   signal p_data         : std_logic_vector(7 downto 0);
@@ -173,7 +174,7 @@ architecture rtl of arbiter is
   signal f_take         : std_logic;
   signal f_data         : std_logic_vector(7 downto 0);
   signal f_last         : std_logic;
-  signal c_index        : std_logic_vector(4 downto 0);
+  signal c_index        : std_logic_vector(5 downto 0);
   signal c_valid        : std_logic;
   signal c_data         : std_logic_vector(31 downto 0);
   signal job_we         : std_logic;
@@ -190,7 +191,7 @@ architecture rtl of arbiter is
   signal failed         : std_logic;
   signal failed_tile    : std_logic_vector(15 downto 0);
   signal engine_wait    : std_logic;
-  signal events         : std_logic_vector(31 downto 0);
+  signal events         : std_logic_vector(39 downto 0);
   signal ev_sent        : std_logic;
   signal ev_late        : std_logic;
   signal ev_excessive   : std_logic;
@@ -337,6 +338,7 @@ begin
       s_start         => s_start,
       s_kind          => s_kind,
       s_bank          => s_bank,
+      tx_abort        => tx_abort,
       p_valid         => p_valid,
       p_ready         => p_ready,
       p_data          => p_data,
@@ -404,7 +406,7 @@ begin
 
   u_counters : entity work.counters
     generic map (
-      G_COUNT => 32
+      G_COUNT => 40
     )
     port map (
       clk     => clk,
@@ -421,7 +423,12 @@ begin
   events(19)           <= collision_seen(1) xor collision_last;
   events(20)           <= ev_late;
   events(21)           <= ev_excessive;
-  events(31 downto 22) <= msg_events(31 downto 22);
+  events(28 downto 22) <= msg_events(28 downto 22);
+  events(29)           <= '0';
+  events(31 downto 30) <= msg_events(31 downto 30);
+  events(33 downto 32) <= "00";
+  events(35 downto 34) <= msg_events(35 downto 34);
+  events(39 downto 36) <= "0000";
 
   collision_seen(0) <= '0';
 
