@@ -225,17 +225,18 @@ class Simulation {
     respond();
   }
 
-  // One thing at a time: a message, or between messages a map packet; after an answer a map packet that is ready.
+  // One thing at a time: a message, or between messages a map packet. After an answer it is the turn of a chunk that is
+  // there, even if it has to wait for the transmitter.
   void respond() {
     if (responding_) return;
-    const bool map_ready = frames_ < 2 && reading_left_ > 0 && map_tile_ == reading_tile_ &&
-                           reading_next_ < finished_ && reading_next_ >= kept_;
-    if (!inbox_.empty() && !(map_turn_ && map_ready)) {
+    const bool map_due =
+        reading_left_ > 0 && map_tile_ == reading_tile_ && reading_next_ < finished_ && reading_next_ >= kept_;
+    if (!inbox_.empty() && !(map_turn_ && map_due)) {
       responding_ = true;
       const Message m = inbox_.front();
       const bool rows = m.type == net::kWrite;
       agenda_.after(clk(kHeaderClocks + (rows ? c_.chunk_bytes : 0)), [this, m] { obey(m); });
-    } else if (map_ready) {
+    } else if (map_due && frames_ < 2) {
       map_turn_ = false;
       responding_ = true;
       ++frames_;
