@@ -144,6 +144,7 @@ void Desk::frame_ends(bool from_chip, bool good, const net::Bytes& frame) {
       recorded_.pop_front();
     }
   }
+  if (on_wire && good && net::fcs_good(frame)) on_wire(from_chip, net::Bytes(frame.begin(), frame.end() - 4));
   if (from_chip && good && plugged_) {
     net::Bytes bare(frame.begin(), frame.end() - 4);
     from_chip_.put(std::move(bare), now_);

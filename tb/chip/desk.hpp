@@ -48,6 +48,8 @@ class Desk {
   Desk(std::unique_ptr<ChipModel> chip, const DeskSettings& settings);
 
   std::function<void(const net::Bytes& frame)> on_frame;  // from the chip, behind the faults, whole and without FCS
+  // Every good frame at the chip's pins as it ends, without FCS: no faults and no cable in between.
+  std::function<void(bool from_chip, const net::Bytes& frame)> on_wire;
 
   void send(net::Bytes frame) { to_chip_.put(std::move(frame), now_); }
   // Straight to the pins, no faults, FCS as it is.
