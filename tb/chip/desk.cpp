@@ -51,6 +51,7 @@ void Desk::reset_chip(Time duration) {
   run_for(std::max(duration, 10 * std::max(rx_period_, clk_period_)));
   chip_->set_reset(false);
   in_reset_ = false;
+  released_ = clocks_;
   // Released in step with each clock, and memories that clear themselves have had their time.
   run_for(std::max(10 * rx_period_, 2000 * clk_period_));
 }
@@ -78,7 +79,7 @@ void Desk::run_to(Time end) {
     } else {
       tx_edge();
     }
-    const bool carrier = link_.carrier(), collision = link_.collision();
+    const bool carrier = held_ || link_.carrier(), collision = link_.collision();
     if (carrier != carrier_ || collision != collision_) {
       carrier_ = carrier;
       collision_ = collision;
@@ -113,7 +114,7 @@ void Desk::rx_edge() {
 
 void Desk::tx_edge() {
   next_tx_ += tx_period_;
-  if (!mii_clocks_) return;
+  if (!mii_clocks_ || !tx_clock_) return;
   const MiiSample from_chip = chip_->tx_edge(now_);
   // A PHY is reset together with the chip, whose outputs say nothing before the first edge that resets them.
   link_.tx_clock(in_reset_ || tx_unknown_ ? MiiSample{} : from_chip);
@@ -143,6 +144,7 @@ void Desk::frame_ends(bool from_chip, bool good, const net::Bytes& frame) {
       recorded_.pop_front();
     }
   }
+  if (on_wire && good && net::fcs_good(frame)) on_wire(from_chip, net::Bytes(frame.begin(), frame.end() - 4));
   if (from_chip && good && plugged_) {
     net::Bytes bare(frame.begin(), frame.end() - 4);
     from_chip_.put(std::move(bare), now_);
