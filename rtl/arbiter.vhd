@@ -457,10 +457,10 @@ begin
   events(32)           <= rx_events(17);
   events(33)           <= ev_deferred;
   events(34)           <= msg_events(34);
-  events(35)           <= msg_events(35) or ev_recovered or flipped(1);
+  events(35)           <= msg_events(35) or ev_recovered or flipped(1) or recovered;
   events(36)           <= rx_events(18) or flipped(2);
   events(38 downto 37) <= not ticked and not missing and (tick_ms & tick_ms);
-  events(39)           <= msg_events(39);
+  events(39)           <= tile_failed;
 
   u_flips : entity work.cdc_sync
     generic map (

@@ -595,7 +595,8 @@ constexpr const char* kNames[kVerdicts] = {"masked", "repeated", "session", "err
 struct Count {
   uint64_t flips = 0, resent = 0;
   uint64_t verdict[kVerdicts] = {};
-  int64_t worst = 0;  // clocks from the upset to the end of the host's work, beyond those of the run without
+  int64_t worst = 0;    // clocks that the host's work took longer than without an upset
+  int64_t silence = 0;  // clocks without a valid answer
 };
 
 struct Options {
@@ -754,6 +755,7 @@ class Campaign {
     }
     ++count.verdict[v];
     count.worst = std::max(count.worst, chip_.world.clocks - end_);
+    count.silence = std::max(count.silence, h.longest);
     if (v == kSilent || v == kHang || v == kError || !options_.only.empty()) {
       found_[v][std::string(site.entity) + " " + site.name].push_back(u);
       if (!options_.brief || v == kHang) {
@@ -791,16 +793,18 @@ class Campaign {
   bool report() const {
     std::printf("%-34s %7s", "upset in", "flips");
     for (const char* name : kNames) std::printf(" %8s", name);
-    std::printf(" %8s %8s\n", "resent", "clocks");
+    std::printf(" %8s %8s %8s\n", "resent", "clocks", "silence");
     Count all;
     auto line = [](const std::string& what, const Count& c) {
       std::printf("%-34s %7llu", what.c_str(), static_cast<unsigned long long>(c.flips));
       for (uint64_t v : c.verdict) std::printf(" %8llu", static_cast<unsigned long long>(v));
-      std::printf(" %8llu %8lld\n", static_cast<unsigned long long>(c.resent), static_cast<long long>(c.worst));
+      std::printf(" %8llu %8lld %8lld\n", static_cast<unsigned long long>(c.resent), static_cast<long long>(c.worst),
+                  static_cast<long long>(c.silence));
     };
     for (const auto& [what, c] : counts_) {
       line(what, c);
       all.flips += c.flips, all.resent += c.resent, all.worst = std::max(all.worst, c.worst);
+      all.silence = std::max(all.silence, c.silence);
       for (int v = 0; v < kVerdicts; ++v) all.verdict[v] += c.verdict[v];
     }
     line("all", all);
