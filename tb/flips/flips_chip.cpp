@@ -600,7 +600,7 @@ struct Count {
 };
 
 struct Options {
-  bool brief = false;
+  bool brief = false, lines = false;
   uint32_t seed = 1;
   int64_t count = 20000;
   int part = 0, parts = 1;
@@ -721,51 +721,50 @@ class Campaign {
 
   Verdict experiment(const Upset& u) {
     const Site& site = kSites[static_cast<size_t>(u.site) - 1];
+    Host& h = chip_.world.host;
+    const Verdict v = run_with(u);
+    const bool over = h.over();
+    const int64_t later = over ? std::max<int64_t>(0, chip_.world.clocks - end_) : 0;
     Count& count = counts_[group(site)];
     ++count.flips;
+    ++count.verdict[v];
+    count.resent += v == kMasked && h.resent > 0;
+    count.worst = std::max(count.worst, later);
+    count.silence = std::max(count.silence, h.longest);
+    if (options_.lines) {
+      std::printf("upset\t%s\t%s\t%s\t%d\t%d\t%lld\t%s\t%d\t%lld\t%lld\n", group(site).c_str(), site.entity, site.name,
+                  u.site, u.bit, static_cast<long long>(u.clock), kNames[v], h.resent, static_cast<long long>(later),
+                  static_cast<long long>(h.longest));
+    } else if (v == kHang || !options_.only.empty()) {
+      std::printf(
+          "flips_chip: %s: %s %s bit %d, clock %lld (phase %d, tile %d, %d sessions lost, %d repeated, %d resent, "
+          "silent for %lld); again: --only %d:%d:%lld\n",
+          kNames[v], site.entity, site.name, u.bit, static_cast<long long>(u.clock), static_cast<int>(h.phase),
+          h.wanted, h.sessions_lost, h.repeated, h.resent, static_cast<long long>(h.longest), u.site, u.bit,
+          static_cast<long long>(u.clock));
+    }
+    if (v == kSilent || v == kHang || v == kError) ++found_[v][std::string(site.entity) + " " + site.name];
+    return v;
+  }
+  Verdict run_with(const Upset& u) {
     size_t at = static_cast<size_t>((u.clock - begin_) / kStep);
     chip_.put_back(states_[at].chip);
     chip_.world = states_[at].world;
     chip_.upset(u);
     const int64_t limit = u.clock + 12 * kSession;
-    Host& h = chip_.world.host;
+    const Host& h = chip_.world.host;
     while (!h.over() && chip_.world.clocks < limit) {
       chip_.run_to(chip_.world.clocks + kStep);
       ++at;
       if (chip_.pending() || at >= states_.size()) continue;
-      if (chip_.world.host == states_[at].world.host && chip_.world.wire == states_[at].world.wire &&
-          chip_.same(states_[at].chip)) {
-        ++count.verdict[kMasked];
+      if (h == states_[at].world.host && chip_.world.wire == states_[at].world.wire && chip_.same(states_[at].chip))
         return kMasked;
-      }
     }
-    Verdict v = kMasked;
-    if (!h.over() || h.longest > kSession + (end_ - begin_) / 2 + kPatience) {
-      v = kHang;
-    } else if (h.phase == Phase::kGaveUp) {
-      v = kError;
-    } else if (!right(h)) {
-      v = kSilent;
-    } else if (h.sessions_lost > 0) {
-      v = kLost;
-    } else if (h.repeated > 0) {
-      v = kRepeated;
-    } else if (h.resent > 0) {
-      ++count.resent;
-    }
-    ++count.verdict[v];
-    count.worst = std::max(count.worst, chip_.world.clocks - end_);
-    count.silence = std::max(count.silence, h.longest);
-    if (v == kSilent || v == kHang || v == kError || !options_.only.empty()) {
-      found_[v][std::string(site.entity) + " " + site.name].push_back(u);
-      if (!options_.brief || v == kHang) {
-        std::printf(
-            "flips_chip: %s: %s %s bit %d, clock %lld (phase %d, %d sessions lost, %d repeated, silent for %lld)\n",
-            kNames[v], site.entity, site.name, u.bit, static_cast<long long>(u.clock), static_cast<int>(h.phase),
-            h.sessions_lost, h.repeated, static_cast<long long>(h.longest));
-      }
-    }
-    return v;
+    if (!h.over() || h.longest > kSession + (end_ - begin_) / 2 + kPatience) return kHang;
+    if (h.phase == Phase::kGaveUp) return kError;
+    if (!right(h)) return kSilent;
+    if (h.sessions_lost > 0) return kLost;
+    return h.repeated > 0 ? kRepeated : kMasked;
   }
   static std::string group(const Site& s) {
     const std::string entity = s.entity, name = s.name;
@@ -791,6 +790,7 @@ class Campaign {
   }
 
   bool report() const {
+    if (options_.lines) return true;
     std::printf("%-34s %7s", "upset in", "flips");
     for (const char* name : kNames) std::printf(" %8s", name);
     std::printf(" %8s %8s %8s\n", "resent", "clocks", "silence");
@@ -808,16 +808,8 @@ class Campaign {
       for (int v = 0; v < kVerdicts; ++v) all.verdict[v] += c.verdict[v];
     }
     line("all", all);
-    for (int v : {kError, kSilent, kHang}) {
-      for (const auto& [what, upsets] : found_[v]) {
-        std::printf("%s: %s:", kNames[v], what.c_str());
-        std::map<int, int> bits;
-        for (const Upset& u : upsets) ++bits[u.bit];
-        for (const auto& [bit, times] : bits) std::printf(times > 1 ? " %d(%d)" : " %d", bit, times);
-        std::printf("; again: --only %d:%d:%lld\n", upsets[0].site, upsets[0].bit,
-                    static_cast<long long>(upsets[0].clock));
-      }
-    }
+    for (int v : {kError, kSilent, kHang})
+      for (const auto& [what, times] : found_[v]) std::printf("%s: %s: %d\n", kNames[v], what.c_str(), times);
     return all.flips > 0 && all.verdict[kHang] == 0;
   }
 
@@ -832,7 +824,7 @@ class Campaign {
   std::vector<State> states_;
   int64_t begin_ = 0, end_ = 0, window_end_ = 0;
   std::map<std::string, Count> counts_;
-  std::map<std::string, std::vector<Upset>> found_[kVerdicts];
+  std::map<std::string, int> found_[kVerdicts];
 };
 
 }  // namespace
@@ -844,6 +836,8 @@ int main(int argc, char** argv) {
     const bool more = i + 1 < argc;
     if (arg == "--short") {
       options.brief = true;
+    } else if (arg == "--lines") {
+      options.lines = true;
     } else if (arg == "--seed" && more) {
       options.seed = static_cast<uint32_t>(std::atoi(argv[++i]));
     } else if (arg == "--count" && more) {
