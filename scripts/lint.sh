@@ -68,7 +68,7 @@ check_files() {
 check_analyse() {
   command -v ghdl > /dev/null || skip "ghdl is not installed" || return
   mkdir "$scratch/work"
-  ghdl -a --std=93c --warn-error --workdir="$scratch/work" "${listed_files[@]}"
+  ghdl -a --std=93 --warn-error --workdir="$scratch/work" "${listed_files[@]}"
 }
 check_vhdl() { scripts/lint_text.pl vhdl "${vhdl_files[@]}"; }
 check_units() { scripts/lint_text.pl units "${vhdl_files[@]}"; }
@@ -102,7 +102,7 @@ verilog_of() {
   shift 3
   if [ $# -ne "$number" ]; then echo "$config: found $# of $number generics"; return 1; fi
   dir=$scratch/$top/$(basename "$config" .json)
-  if cmake -D GHDL=ghdl -D STANDARD=--std=93c -D TOP="$top" -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
+  if cmake -D GHDL=ghdl -D STANDARD=--std=93 -D TOP="$top" -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
     -D "GENERICS=$(IFS='|'; echo "$*")" -D "DIR=$dir" -P scripts/cmake/VhdlToVerilog.cmake &&
     verilator --lint-only -Wall --top-module "$top" scripts/cmake/ghdl_netlist.vlt "$dir/$top.v"; then
     return 0

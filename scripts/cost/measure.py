@@ -159,7 +159,7 @@ def convert(entity, generics, rtl, work):
             raise CostError(f"{entity} has no generic {name}: " + ", ".join(known))
     sources = [str(rtl / f) for f in files[:files.index(f"{entity}.vhd") + 1]]
     (work / "ghdl").mkdir()
-    options = ["--std=93c", f"--workdir={work}/ghdl"]
+    options = ["--std=93", f"--workdir={work}/ghdl"]
 
     def ghdl(*arguments):
         run = subprocess.run(["ghdl", *arguments], capture_output=True, text=True)
@@ -258,7 +258,10 @@ def netlist(entity, family, generics, rtl, path):
 
 
 def source(top, work):
-    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
+    """Nobody uses a word that a RAM of these reads while it is written; the template that synthesis sees returns the old
+    one, which Yosys would keep on devices whose blocks do not (NG-MEDIUM)."""
+    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*",
+            "setattr -set no_rw_check 1 ram_sdp*/m:* ram_2r*/m:*"]
 
 
 def counted(top, family, no_dsp, work, rows=()):
