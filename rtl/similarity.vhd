@@ -13,8 +13,8 @@
 --   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
 --             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
---             Accumulators in slices begin with 0. The -1 that makes an inverted denominator of a negative one comes from
---             S(l)^2 - 1 = (S(l) + 1)(S(l) - 1): S(l) - 1 is accumulated, the other factor is that adder's sum.
+--             Accumulators of slices begin with 0. The -1 that makes an inverted denominator of a negative one is in
+--             S(l)^2 - 1 = (S(l) + 1)(S(l) - 1): S(l) - 1 is accumulated, the adder before the multiplier adds 2
 --   Rate    : one sample per clock; cells leave in raster order
 --   Latency : similarity_latency(G_MNCC_W) clocks from the last sample of a window to its cell (psweep_pkg)
 --   Numbers : samples ufix(G_SAMPLE_W,0); all sums exact; operands of the division truncated to G_MNCC_W+3 bits, the

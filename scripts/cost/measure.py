@@ -257,11 +257,13 @@ def netlist(entity, family, generics, rtl, path):
         pathlib.Path(path).write_text((work / "netlist.v").read_text())
 
 
+# Nobody uses a word that a RAM of these reads while it is written. The template that synthesis sees returns the old
+# one, which Yosys would build around blocks that do not (ECP5, NG-MEDIUM).
+UNUSED_READS = "setattr -set no_rw_check 1 ram_sdp*/m:* ram_2r*/m:*"
+
+
 def source(top, work):
-    """Nobody uses a word that a RAM of these reads while it is written; the template that synthesis sees returns the old
-    one, which Yosys would keep on devices whose blocks do not (NG-MEDIUM)."""
-    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*",
-            "setattr -set no_rw_check 1 ram_sdp*/m:* ram_2r*/m:*"]
+    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*", UNUSED_READS]
 
 
 def counted(top, family, no_dsp, work, rows=()):

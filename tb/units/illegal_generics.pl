@@ -1,7 +1,8 @@
 #!/usr/bin/env perl
 # SPDX-License-Identifier: Apache-2.0
 # Every range that an entity asserts of a generic is tried just outside: GHDL has to stop with the entity's own message,
-# which names the generic; in simulation, one value an entity, it has to stop as well, and most say the value. The values follow from the message, so no new range is forgotten.
+# which names the generic; in simulation, with one value an entity, it has to stop as well, and most say the value. The
+# values follow from the message, so no new range is forgotten.
 #
 #   illegal_generics.pl RTL_FOLDER WORK_FOLDER GHDL
 #
@@ -36,7 +37,8 @@ for my $file (@sources) {
   $default{$1} = $2 while $text =~ /^\s+(G_\w+)\s*:\s*integer\s*:=\s*(-?\d+)/mg;
   my %seen;
   # The value stands between translate_off and translate_on: GHDL as a synthesis tool leaves it out, as a simulator not.
-  $text =~ s/"\s+-- synthesis translate_off\s+& "=" & integer'image\((\w+)\)\s+-- synthesis translate_on\s+& "/=" & integer'image($1) & "/g;
+  my ($off, $on) = ('-- synthesis translate_off', '-- synthesis translate_on');
+  $text =~ s/"\s+$off\s+& "=" & (integer'image\(\w+\))\s+$on\s+& "/=" & $1 & "/g;
   while ($text =~ /report "(\w+): (G_\w+)=" & integer'image\(\2\) & " ([^"]*)"/g) {
     my ($who, $generic, $rule) = ($1, $2, $3);
     die "$file: a message of $who\n" if $who ne $entity;
