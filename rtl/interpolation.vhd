@@ -165,6 +165,10 @@ begin
     signal s2_upper         : signed(C_ROW_W downto 0);
     -- s6 (s3 with G_RECTIFIED): result, ufix(G_PIX_W,G_INTERP_F)
     signal s6_sample : std_logic_vector(C_OUT_W - 1 downto 0);
+
+    attribute use_dsp48 : string;
+
+    attribute use_dsp48 of s2_upper_product : signal is C_DSP;
   begin
 
     fx  <= s0_fx((n + 1) * G_WEIGHT_W - 1 downto n * G_WEIGHT_W);
@@ -215,6 +219,8 @@ begin
       -- s5: times fy
       signal s5_product : signed(C_EXACT_W downto 0);
       signal s5_start   : signed(C_EXACT_W downto 0);
+
+      attribute use_dsp48 of s2_lower_product, s5_product : signal is C_DSP;
     begin
 
       fy  <= s0_fy((n + 1) * G_WEIGHT_W - 1 downto n * G_WEIGHT_W);

@@ -44,8 +44,8 @@ build_and_prove() {
   name=${name%%[.-]*} # behind a '-': the same properties with other generics
   # shellcheck disable=SC2086
   {
-    ghdl -a --std=93c --workdir="$dir" "$@" &&
-      ghdl --synth --std=93c --no-formal --workdir="$dir" --out=verilog $generics "$top" > "$dir/raw.v"
+    ghdl -a --std=93 --workdir="$dir" "$@" &&
+      ghdl --synth --std=93 --no-formal --workdir="$dir" --out=verilog $generics "$top" > "$dir/raw.v"
   } > "$dir/ghdl.log" 2>&1 || { echo "GHDL failed: $dir/ghdl.log"; return; }
   sed -E 's/always @\(posedge (\w+)\)/always @($global_clock) if (\1)/' "$dir/raw.v" > "$dir/steps.v"
   if grep -qE 'posedge|negedge' "$dir/steps.v"; then echo "an edge in $dir/raw.v was not understood"; return; fi
@@ -173,8 +173,8 @@ check_crossings() {
   local dir=$1
   shift
   {
-    ghdl -a --std=93c --workdir="$dir" "$@" &&
-      ghdl --synth --std=93c --no-formal --workdir="$dir" --out=verilog -gG_PLANE_COLS=16 -gG_PLANE_ROWS=16 \
+    ghdl -a --std=93 --workdir="$dir" "$@" &&
+      ghdl --synth --std=93 --no-formal --workdir="$dir" --out=verilog -gG_PLANE_COLS=16 -gG_PLANE_ROWS=16 \
         -gG_IMG_COLS=40 -gG_IMG_ROWS=40 -gG_PLANES=5 arbiter > "$dir/raw.v"
   } > "$dir/ghdl.log" 2>&1 || { echo "GHDL failed: $dir/ghdl.log"; return; }
   { echo "read_verilog $dir/raw.v"; cat tb/formal/crossings.ys; } > "$dir/proof.ys"
