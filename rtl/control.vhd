@@ -229,6 +229,7 @@ architecture rtl of control is
   signal tile_drop   : std_logic;
   signal drop_q      : std_logic;
   signal halt        : std_logic; -- idle comes next, whatever the state
+  signal move        : std_logic; -- the state is over
   signal config_bad  : std_logic;
   signal table_bad   : std_logic;
   signal window_seen : std_logic; -- in this tile
@@ -502,6 +503,11 @@ begin
                  or (map_last and map_more and not abort_q) -- (a beat that an abort takes away is none)
                  or ((is_sweep or is_flush) and to_bit(unsigned(word_error) /= 0));
   halt        <= command_abort or event_upset;
+  -- Apart from where to, so that no chain of states lies before the register's enable.
+  move        <= (is_idle and command_start)
+                 or (is_load and s_pix_tvalid and (at_last or s_pix_tlast))
+                 or at_tile_end or flushed or tile_done
+                 or (is_drain and s_pix_tvalid and s_pix_tlast);
   -- A drained tile was counted when it was refused.
   tile_drop   <= event_config or event_table or event_short or event_long or event_upset
                  or (command_abort and not is_idle and not is_drain and not tile_done and not event_short
@@ -513,34 +519,26 @@ begin
       start_q <= load_done and not command_abort;
       abort_q <= halt;
 
-      if is_idle = '1' then
-        if start_ok = '1' then
-          state_q <= C_LOAD;
-        elsif event_config = '1' or event_table = '1' then
-          state_q <= C_DRAIN;
-        end if;
-      elsif is_load = '1' then
-        if load_done = '1' then
-          state_q <= C_SWEEP;
-        elsif event_short = '1' then
-          state_q <= C_IDLE;
-        elsif event_long = '1' then
-          state_q <= C_DRAIN;
-        end if;
-      elsif is_sweep = '1' then
-        if at_tile_end = '1' then
+      if move = '1' then
+        if is_idle = '1' then
+          if config_bad = '1' or table_bad = '1' then
+            state_q <= C_DRAIN;
+          else
+            state_q <= C_LOAD;
+          end if;
+        elsif is_load = '1' then
+          if at_last = '0' then
+            state_q <= C_IDLE;
+          elsif s_pix_tlast = '1' then
+            state_q <= C_SWEEP;
+          else
+            state_q <= C_DRAIN;
+          end if;
+        elsif is_sweep = '1' then
           state_q <= C_FLUSHING;
-        end if;
-      elsif is_flush = '1' then
-        if flushed = '1' then
+        elsif is_flush = '1' then
           state_q <= C_UNLOAD;
-        end if;
-      elsif is_unload = '1' then
-        if tile_done = '1' then
-          state_q <= C_IDLE;
-        end if;
-      elsif is_drain = '1' then
-        if s_pix_tvalid = '1' and s_pix_tlast = '1' then
+        else
           state_q <= C_IDLE;
         end if;
       end if;

@@ -162,7 +162,7 @@ for lanes in 1 2; do
     rtl/control.vhd 'a tile too wide allowed' 's/cfg_value <= G_PLANE_COLS\)/cfg_value <= G_PLANE_COLS + 1)/' \
     rtl/control.vhd 'a set too many' 's/plane_set >= last_set or/plane_set > last_set or/' \
     rtl/control.vhd 'a short row' 's/to_unsigned\(C_ROW_MIN - 1, C_COL_W\)/to_unsigned(C_ROW_MIN - 2, C_COL_W)/' \
-    rtl/control.vhd 'long packet not drained' "/elsif event_long = '1' then/{n;s/C_DRAIN/C_IDLE/}" \
+    rtl/control.vhd 'long packet not drained' '/state_q <= C_SWEEP;/{n;n;s/C_DRAIN/C_IDLE/}' \
     rtl/control.vhd 'map unloaded too early' 's/(C_FLUSH +: integer := G_LATENCY) \+ 2/\1/' \
     rtl/control.vhd 'done and dropped' 's/ and not tile_done and not event_short$/ and not event_short/' \
     rtl/control.vhd 'samples after an abort' "s/active +<= '0';\$/active <= active;/"
