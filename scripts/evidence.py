@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Evidence that says what it was measured on (docs/verification.md, "How evidence is kept").
 
-  scripts/evidence.py status [--strict] [KIND ..]     what is there, what is stale and why; --strict: exit code 1 if any is
-  scripts/evidence.py run [--force] [KIND ..]         makes what is stale (make evidence), stamps it, writes the pages
+  scripts/evidence.py status [--strict] [KIND ..]     what is there, what is stale and why; --strict: then exit code 1
+  scripts/evidence.py run [--force] [KIND ..]         makes what is stale (make evidence), stamps it, writes pages
   scripts/evidence.py stamp [--force] [--at COMMIT] KIND ..
                                                       stamps what the latest run of a kind left in build/; --at: it was
                                                       made of the sources of that commit
@@ -22,7 +22,7 @@ import sys
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 
-from evidence import figures, manifest, pages, runner, sources  # noqa: E402
+from evidence import figures, lists, manifest, pages, runner, sources  # noqa: E402
 
 
 def _status(kinds: list[manifest.Kind], strict: bool) -> int:
@@ -58,6 +58,8 @@ def _lint() -> int:
         print(line)
     for line in found.dated:
         print(f"note: {line} does not say yet that its sources have changed: scripts/evidence.py blocks")
+    for line in lists.gone():
+        print(f"note: {line}")
     for name, one in status.items():
         if one.stale:
             print(f"note: {name}: {one.text()}")

@@ -10,8 +10,8 @@ from evidence.pages import page_files
 
 WAIVERS = "scripts/evidence/not_measured.txt"
 # Cells that are a figure: a number, with a unit or several of them.
-_FIGURE = re.compile(r"\**[+-]?(about )?\d[\d., x/+%()-]*( (LUT|FF|RAMB36|DSP|Mbit/s|Mbit|ms|us|s|M|%|MHz|mm|K|clocks).*)?"
-                     r"\**$")
+_FIGURE = re.compile(r"\**[+-]?(about )?\d[\d., x/+%()-]*"
+                     r"( (LUT|FF|RAMB36|DSP|Mbit/s|Mbit|ms|us|s|M|%|MHz|mm|K|clocks).*)?\**$")
 _COMMIT = re.compile(r"\bcommit `?[0-9a-f]{7,}\b|\bAt commit\b", re.I)
 FEWEST = 5  # figures, from which on a table is one of figures
 
@@ -71,6 +71,7 @@ def check(root: pathlib.Path = sources.ROOT) -> list[str]:
             at = text.splitlines()[:number]
             section = sections[sum(bool(re.match(r"##? ", line)) for line in at)]
             if not _COMMIT.search(section):
-                wrong.append(f"{name}:{number}: figures that do not say by which commit they were measured: {head[:80]}")
+                wrong.append(f"{name}:{number}: figures that do not say at which commit they were measured: "
+                             f"{head[:80]}")
     wrong += [f"{WAIVERS}: fits no table: {page} {head}" for page, head in sorted(known.keys() - used)]
     return wrong

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The blocks of the pages: between `<!-- evidence: NAME -->` and `<!-- /evidence -->` stands what tables.py makes of the
-records, and at which commit it was measured. Never edited by hand."""
+"""The blocks of the pages: between `<!-- evidence: NAME -->` and `<!-- /evidence -->` stands what tables.py makes of
+the records, and at which commit it was measured. Never edited by hand."""
 import pathlib
 import re
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from evidence.manifest import BY_NAME
 from evidence.records import Record, Status
 from evidence.tables import BLOCKS, wrapped
 
-_BLOCK = re.compile(r"<!-- evidence: ([\w.-]+) -->\n(.*?)<!-- /evidence -->", re.S)
+_BLOCK = re.compile(r"^<!-- evidence: ([\w.-]+) -->\n(.*?)^<!-- /evidence -->", re.S | re.M)
 # Changes with every edit of the RTL, so it does not count when a block is compared with its results.
 SINCE = re.compile(r"; (?:the RTL has|its sources have) changed since")
 
@@ -93,7 +93,7 @@ def check(status: dict[str, Status], write: bool, root: pathlib.Path = sources.R
                 out.dated.append(f"{name}: block '{block}'")
             return new
         new = _BLOCK.sub(fill, text)
-        if len(re.findall(r"<!-- evidence: ", text)) != len(_BLOCK.findall(text)):
+        if len(re.findall(r"^<!-- evidence: ", text, re.M)) != len(_BLOCK.findall(text)):
             out.wrong.append(f"{name}: a block that is not closed")
         if write and new != text:
             page.write_text(new)

@@ -160,7 +160,8 @@ def link_speed(text: str) -> Results:
     for n in (1, 2):
         part = _need(re.search(rf"^{n} in flight.*?(?=^\d in flight|^full duplex|\Z)", text, re.M | re.S),
                      f"'{n} in flight'")[0]
-        out[f"flight_{n}"] = {"busy": number(r"busy ([\d.]+) %", part), "seconds": number(r"whole pair +([\d.]+) s", part),
+        out[f"flight_{n}"] = {"busy": number(r"busy ([\d.]+) %", part),
+                              "seconds": number(r"whole pair +([\d.]+) s", part),
                               "stall": number(r"stall per tile change +(\d+)", part),
                               "before": number(r"before the first launch +([\d.]+) ms", part),
                               "after": number(r"last map beat to end +([\d.]+) ms", part)}

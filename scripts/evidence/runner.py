@@ -33,8 +33,9 @@ def _execute(kind: Kind) -> tuple[int, float]:
     code = 0
     with open(log_of(kind), "wb") as log:
         for command in kind.command:
-            with subprocess.Popen(["make", *command.split()], cwd=sources.ROOT, stdout=subprocess.PIPE,
-                                  stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True) as process:
+            with subprocess.Popen(["make", *command.split()], cwd=sources.ROOT, stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                  start_new_session=True) as process:
                 try:
                     assert process.stdout is not None
                     for line in process.stdout:

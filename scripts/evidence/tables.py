@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of the pages out of the records. Each block: the kinds it tells of, and a function of their records (those that
-there are) and of where each is from, in words."""
+"""Tables of the pages out of the records. Each block: the kinds it tells of, and a function of their records (those
+that there are) and of where each is from, in words."""
 import re
 import textwrap
 from collections.abc import Callable
@@ -115,8 +115,9 @@ _PROVED = {
     "stream_fifo": ("`stream_fifo`, 3 bits, 3 places",
                     "order, nothing lost or doubled, a shown beat holds; `few` and `more`"),
     "control": ("`control`, 1 lane, up to 3 planes of 2 x 2 cells",
-                "a tile starts only with legal sizes and a written table; its pixels and samples in order; rows 8 clocks "
-                "apart; no unload too early; each start ends in one tile done or one dropped; no state beyond the six"),
+                "a tile starts only with legal sizes and a written table; its pixels and samples in order; rows 8 "
+                "clocks apart; no unload too early; each start ends in one tile done or one dropped; no state beyond "
+                "the six"),
     "control-2": ("`control`, 2 lanes", "the same"),
     "crc_step": ("the CRC of a nibble",
                  "equal to four steps of the definition; a frame with its own FCS leaves the residue"),
@@ -172,8 +173,8 @@ def gates_faults(r: dict[str, Any]) -> str:
 @simple("sim-ghdl")
 def sim_ghdl(r: dict[str, Any]) -> str:
     if not r.get("replays"):
-        return wrapped(f"`make sim-ghdl`: {r['configurations']} configurations, {r['steps'][0]} to {r['steps'][1]} steps "
-                       "each, no difference.")
+        return wrapped(f"`make sim-ghdl`: {r['configurations']} configurations, {r['steps'][0]} to {r['steps'][1]} "
+                       "steps each, no difference.")
     return wrapped(f"`make sim-ghdl`: {r['replays']} of {r['of']} replays without a difference: {r['configurations']} "
                    f"configurations, seeds {', '.join(map(str, r['seeds']))}, {r['steps'][0]} to {r['steps'][1]} steps "
                    f"each, {r['values']:,} values compared.")
@@ -231,7 +232,8 @@ def link_speed_readme(r: dict[str, Any]) -> str:
          f"{_mbit(r['half'])} / {_mbit(r['host_half'])} Mbit/s", "-", "same"],
         ["engine busy, two tiles in flight, 256 x 130 tiles", f"{r['flight_2']['busy']:.1f} %", "-", "same"],
         ["a 1120 x 1120 x 301 pair, first packet to last, two tiles in flight / one",
-         f"{r['flight_2']['seconds']:.2f} / {r['flight_1']['seconds']:.2f} s", "-", "same, from its first three tiles"]])
+         f"{r['flight_2']['seconds']:.2f} / {r['flight_1']['seconds']:.2f} s", "-",
+         "same, from its first three tiles"]])
 
 
 def _printed(name: str, kind: str, number: int) -> None:
@@ -324,11 +326,12 @@ def summary(records: Records, origins: Origins) -> str:
         ("lines of VHDL that the recordings run", "coverage-lines", lambda r: f"{_share(r['all'])} %",
          "`make coverage`"),
         ("proofs by induction: FIFOs, control, CRC, clock crossings", "formal",
-         lambda r: f"{sum(x['proved'] for x in r['rows'].values())}, and {_faults_of(r)} faults found", "`make formal`"),
+         lambda r: f"{sum(x['proved'] for x in r['rows'].values())}, and {_faults_of(r)} faults found",
+         "`make formal`"),
         ("random tiles with stalls, resets, bad packets and registers", "soak",
          lambda r: f"{r['tiles']:,}, all counted", "`make soak`"),
         ("bits flipped in control, plane table, map of the engine", "flips",
-         lambda r: f"{r['all']['flips']:,}, " + ("nothing hangs" if not r["all"]["hang"] else f"{r['all']['hang']} hang"),
+         lambda r: f"{r['all']['flips']:,}, " + (f"{r['all']['hang']} hang" if r["all"]["hang"] else "nothing hangs"),
          "`make flips`"),
         ("bits flipped in all registers of the chip, while tiles run over the link", "flips-chip",
          lambda r: r["verdict"], "`make flips-chip`"),
@@ -337,4 +340,5 @@ def summary(records: Records, origins: Origins) -> str:
                              for s, rows in r["suites"].items()), "`make fresh-machine`"),
     ]
     return table(["layer", "figure", "command", "at commit"],
-                 [[what, found(kind, text), command, _at(kind, records, origins)] for what, kind, text, command in rows])
+                 [[what, found(kind, text), command, _at(kind, records, origins)]
+                  for what, kind, text, command in rows])

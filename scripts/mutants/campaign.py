@@ -96,7 +96,8 @@ class Campaign:
             for line in self._file.read_text().splitlines():
                 try:
                     entry = json.loads(line)
-                    kept[entry.pop("key")] = Result(**entry)
+                    key = entry.pop("key")
+                    kept[key] = Result(**entry)
                 except (ValueError, KeyError, TypeError):
                     pass  # a line that was cut short
         return kept
@@ -175,6 +176,8 @@ class Campaign:
             for test in self.chains.of[m.entity]:
                 if test.name in out.passed or test.thorough and not thorough:
                     continue
+                if test.thorough and time.monotonic() >= self.until:
+                    break
                 seconds = self.baseline(test, job)
                 job.put(m.entity, "\n".join(lines))
                 verdict = None
@@ -200,6 +203,11 @@ class Campaign:
             else:
                 if thorough:
                     out.verdict = SURVIVED
+        except Stopped:
+            if out.passed != result.passed:
+                with self._change:
+                    self._keep(self.key(m, entity), out)
+            raise
         finally:
             job.put(m.entity, original)
         out.seconds = round(out.seconds + time.monotonic() - begun, 1)

@@ -14,6 +14,7 @@ _DECLARATION = re.compile(
     r"\b", re.I)
 _TOKEN = re.compile(
     r"""(\s+)|(x?"[^"]*"|'[01XZ-]'|\d+\#\w+\#|[a-zA-Z]\w*'\w+|[a-zA-Z]\w*|\d+|<=|>=|/=|=>|:=|\*\*|.)""")
+_WHEN = re.compile(r"(\s*\w+\s*(?:<=|:=)\s*)([^;]+?)\s+when\s+([^;]+?)\s+else\s+([^;]+?)\s*;\s*$", re.I)
 _COMPARE = {"=": "/=", "/=": "=", "<": "<=", ">": ">=", ">=": ">"}
 _WORDS = {"and": ("logic", "or"), "or": ("logic", "and"), "xor": ("logic", "or"), "not": ("logic", ""),
           "true": ("constant", "false"), "false": ("constant", "true"), "'0'": ("constant", "'1'"),
@@ -111,7 +112,8 @@ def _token_faults(line: str, code: str, state: _Statement, is_clock: bool) -> li
             begin, end = tokens[i - 1][1], tokens[i + 1][1] + len(following)
             for d in (1, -1):
                 if int(following) + d >= 0:
-                    found.append(("slice", f"{line[:begin]}{int(previous) + d} downto {int(following) + d}{line[end:]}"))
+                    bounds = f"{int(previous) + d} downto {int(following) + d}"
+                    found.append(("slice", f"{line[:begin]}{bounds}{line[end:]}"))
     return found
 
 
@@ -160,7 +162,7 @@ def candidates(entity: str, text: list[str], seed: int) -> list[Mutant]:
                 faults.append(("deletion", re.match(r"\s*", code)[0] + "null;"))
             if m := re.match(r"(\s*)(if|elsif)\s+(.*\S)\s+then\s*$", code, re.I):
                 faults += [("branch", f"{m[1]}{m[2]} false then"), ("branch", f"{m[1]}{m[2]} true then")]
-            if m := re.match(r"(\s*\w+\s*(?:<=|:=)\s*)([^;]+?)\s+when\s+([^;]+?)\s+else\s+([^;]+?)\s*;\s*$", code, re.I):
+            if m := _WHEN.match(code):
                 faults.append(("branch", f"{m[1]}{m[4]} when {m[3]} else {m[2]};"))
         found += [Mutant(entity, number, rule, line, after, nth, md5(f"{seed}|{entity}|{line}|{nth}|{after}"))
                   for rule, after in faults if trimmed(after) != trimmed(line)]
