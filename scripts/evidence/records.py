@@ -88,11 +88,10 @@ def layout(value: Any, indent: int = 0, width: int = 118) -> str:
 
 def machine() -> str:
     """The class of this machine."""
-    name = ""
-    if pathlib.Path("/etc/os-release").is_file():
-        found = re.search(r'^PRETTY_NAME="?([^"\n]*)', pathlib.Path("/etc/os-release").read_text(), re.M)
-        name = found[1] if found else ""
-    return f"{os.cpu_count()} cores, {platform.machine()}, {name or platform.system()}"
+    about = pathlib.Path("/etc/os-release")
+    found = dict(re.findall(r'^(ID|VERSION_ID)="?([^"\n]*)', about.read_text(), re.M)) if about.is_file() else {}
+    name = f"{found.get('ID', platform.system()).capitalize()} {found.get('VERSION_ID', '')}".strip()
+    return f"{os.cpu_count()} cores, {name}"
 
 
 def stamp_of(files: dict[str, str], commit: str = "HEAD") -> Stamp:
