@@ -16,7 +16,7 @@ from evidence import sources
 @dataclass(frozen=True)
 class Test:
     name: str
-    build: str  # the build folder: 'all', or one with a single engine or chip in it (workshop.py)
+    build: str  # the build folder: 'all', engine_<configuration> or chip_<configuration> (workshop.py)
     targets: tuple[str, ...]
     command: tuple[str, ...]
     whole: bool  # of the whole engine or chip; else of the entity alone
@@ -33,7 +33,7 @@ def unit(name: str) -> Test:
 
 
 def _soak(config: str) -> Test:
-    return Test(f"soak of {config}", config, ("soak",), ("tb/soak/soak", "-a"), True, False, ("tb/soak/soak.cpp",),
+    return Test(f"soak of {config}", f"engine_{config}", ("soak",), ("tb/soak/soak", "-a"), True, False, ("tb/soak/soak.cpp",),
                 "psweep", (("PSWEEP_CONFIG", config), ("PSWEEP_TILES", "150")),
                 (f"tb/configs/{config}.json", "tb/replay/engine.cpp.in", "tb/replay/ports.pl"))
 
@@ -59,9 +59,13 @@ ENGINE = (
            ("tb/replay/record_engine.cpp",), "psweep"),
 )
 _CHIP_FIRST = (
-    Test("fuzz of tiny_min", "tiny_min", ("test_fuzz",), ("tb/chip/test_fuzz", "-a"), True, False,
+    Test("fuzz of tiny_min", "chip_tiny_min", ("test_fuzz",), ("tb/chip/test_fuzz", "-a"), True, False,
          ("tb/chip/test_fuzz.cpp",), "psweep_top", (("PSWEEP_FUZZ_CHIP", "tiny_min"), ("PSWEEP_FUZZ_FRAMES", "1000")),
          ("tb/configs/tiny_9.json", "tb/chip/configs/tiny_min.json")),
+    Test("pairs on tiny", "chip_tiny", ("test_chip",),
+         ("tb/chip/test_chip", "-a", "chip: half duplex*,chip: reset in the*,chip: clocks of the*,chip: another host*"),
+         True, False, ("tb/chip/test_chip.cpp",), "psweep_top", (),
+         ("tb/configs/tiny.json", "tb/chip/configs/tiny.json")),
     _program("chip", "test_fuzz", "psweep_top"),
     _program("chip", "test_chip", "psweep_top", "~chip: recording*"),
 )

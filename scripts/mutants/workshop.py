@@ -107,13 +107,14 @@ class Job:
         if name in self._configured:
             return build
         options = list(_OPTIONS)
-        engine = self.tree / "tb" / "configs" / f"{name}.json"
-        if name != "all" and engine.is_file():
+        kind, _, config = name.partition("_")
+        if kind == "engine":
             (build / "configs").mkdir(parents=True, exist_ok=True)
-            (build / "configs" / engine.name).write_bytes(engine.read_bytes())
+            text = (self.tree / "tb" / "configs" / f"{config}.json").read_bytes()
+            (build / "configs" / f"{config}.json").write_bytes(text)
             options.append("-DPSWEEP_SWEEP=ON")
-        elif name != "all":
-            options.append(f"-DPSWEEP_CHIPS={name}")
+        elif kind == "chip":
+            options.append(f"-DPSWEEP_CHIPS={config}")
         log = self.at / f"configure.{name}.log"
         log.unlink(missing_ok=True)
         code, _ = self.run(log, 600, ["cmake", "-S", "tree", "-B", name, "-G", "Ninja", *options], self.at)
