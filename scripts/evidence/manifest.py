@@ -67,8 +67,6 @@ KINDS: tuple[Kind, ...] = (
          ("@chip", *BUILD, *MODEL, "tb/units/**", "tb/engine/**", "tb/rtl/**", "tb/chip/**", "sw/net/**",
           "scripts/coverage.sh", "scripts/coverage.pl"),
          35, "build/coverage/toggles.txt"),
-    Kind("bench", ("bench",), (*ENGINE, "sw/fast/**", "sw/reference/**", "sw/app/**", "tb/engine/one_tile.cpp",
-                               "scripts/bench.sh"), 5),
     Kind("accuracy", ("accuracy",),
          ("sw/eval/**", "sw/scene/**", "sw/reference/**", "sw/golden/**", "sw/fast/**", "sw/core/**"), 30),
     Kind("pnr", ("pnr-update",), ("@engine", "tb/configs/tile.json", "scripts/cost/**", "!scripts/cost/baseline.json",

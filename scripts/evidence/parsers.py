@@ -72,19 +72,20 @@ def flips(text: str) -> Results:
 
 
 def flips_chip(text: str) -> Results:
-    """Whatever columns its table has: '<what> <number> ..' under a head line 'upset in ..', or a Markdown table."""
-    tables = markdown_tables(text)
-    if not tables:
-        rows: list[list[str]] = []
-        for line in text.splitlines():
-            cells = re.split(r"\s{2,}", line.strip())
-            if len(cells) > 2 and (rows and re.fullmatch(r"[\d.]+", cells[1]) or line.startswith("upset in")):
-                # The head may have only one blank between its columns.
-                rows.append(cells)
-        tables = [rows] if rows else []
-    _need(tables and len(tables[0]) > 1, "table of upsets")
-    last = [line for line in text.splitlines() if line.strip()][-1]
-    return {"tables": tables, "verdict": last}
+    """Tables '<what>, 34 columns wide> <number> ..' under a head 'upset in ..'; those of several parts are added up."""
+    columns: list[str] = []
+    rows: dict[str, dict[str, int]] = {}
+    for line in text.splitlines():
+        if line.startswith("upset in "):
+            columns = line[34:].split()
+        elif columns and (m := re.fullmatch(r"(.{34,}?)((?: +\d+){%d})" % len(columns), line)):
+            row = rows.setdefault(m[1].strip(), dict.fromkeys(columns, 0))
+            for name, value in zip(columns, map(int, m[2].split())):
+                row[name] = max(row[name], value) if name == "clocks" else row[name] + value
+    whole = rows.pop("all", None)
+    _need(whole and whole.get("flips"), "upsets")
+    sites = re.findall(r"^((?:error|silent|hang): [^;\n]*)", text, re.M)
+    return {"columns": columns, "rows": rows, "all": whole, "sites": sites}
 
 
 _SOAK = re.compile(
@@ -200,11 +201,14 @@ def coverage(text: str) -> Results:
     return {"rows": rows, "all": whole, "holes": len(holes), "silent": len(silent)}
 
 
-def bench(text: str) -> Results:
-    rows = [line.strip() for line in text.splitlines() if line.strip()]
-    rates = [float(x) for x in re.findall(r"([\d.e+]+) (?:M )?clocks/s", text)]
-    _need(rates, "clocks/s")
-    return {"lines": rows}
+def accuracy(text: str) -> Results:
+    """Three runs, each behind a line 'accuracy: NAME' (make accuracy)."""
+    runs = {}
+    for m in re.finditer(r"^accuracy: (\w+)$(.*?)(?=^accuracy: |\Z)", text, re.M | re.S):
+        runs[m[1]] = [row for t in markdown_tables(m[2]) for row in t if row[0] != "scene"]
+    for name in ("scenes", "unseen", "formats"):
+        _need(runs.get(name), f"table '{name}'")
+    return runs
 
 
 def fresh_machine(text: str) -> Results:
@@ -230,7 +234,7 @@ PARSERS: dict[str, Callable[[str], Results]] = {
     "mutants": mutants, "flips": flips, "flips-chip": flips_chip, "soak": soak, "formal": formal, "rules": rules,
     "cost": baseline, "pnr": baseline, "gates": gates, "link-speed": link_speed, "sim-ghdl": sim_ghdl,
     "link-table": tables, "shape-table": tables, "sweep": sweep, "coverage-lines": coverage,
-    "coverage-toggles": coverage, "bench": bench, "accuracy": tables, "fresh-machine": fresh_machine}
+    "coverage-toggles": coverage, "accuracy": accuracy, "fresh-machine": fresh_machine}
 
 
 def results(kind: Kind, printed: pathlib.Path) -> Results:

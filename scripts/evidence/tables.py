@@ -84,9 +84,25 @@ def flips(r: dict[str, Any]) -> str:
             wrapped(f"{verdict}: {r['all']['flips']} upsets. Without an upset the tile takes {plain} clocks."))
 
 
+def _chip_verdict(r: dict[str, Any]) -> str:
+    a = r["all"]
+    silent = f"{a['silent']} silently wrong" if a.get("silent") else "none silently wrong"
+    hang = f"{a['hang']} hang" if a.get("hang") else "none hangs"
+    return f"{a['flips']:,}: {hang}, {silent}"
+
+
 @simple("flips-chip")
 def flips_chip(r: dict[str, Any]) -> str:
-    return "\n\n".join(table(t[0], t[1:]) for t in r["tables"]) + f"\n\n{wrapped(r['verdict'])}"
+    names = {"clocks": "worst clocks"}
+    text = table(["upset in", *(names.get(c, c) for c in r["columns"])],
+                 [[name, *(row[c] for c in r["columns"])] for name, row in [*r["rows"].items(), ("**all**", r["all"])]])
+    for kind, title in (("hang", "Hung, register and bits (times):"),
+                        ("silent", "Silently wrong, register and bits (times):"),
+                        ("error", "Reported as an error, register and bits (times):")):
+        found = [site.removeprefix(f"{kind}: ") for site in r["sites"] if site.startswith(f"{kind}: ")]
+        if found:
+            text += f"\n\n{title}\n" + "\n".join(wrapped(f"- {site}", 120, "  ") for site in found)
+    return text
 
 
 @simple("soak")
@@ -269,6 +285,88 @@ def coverage_toggles(r: dict[str, Any]) -> str:
                  [*rows, ["all", r["all"][1], r["all"][0], _share(r["all"])]])
 
 
+# ---- accuracy
+
+_SCENE = ["scene", "engine", "M1 mm", "M2.a %", "M2.b mm", "M3 %", "M4 px", "RMS mm"]
+_BESIDE = ["<= 0.25 mm of float %", "> 2 cm %", "float's holes kept %", "hole or depth as float %"]
+_FIXED = "fixed 8.2, MNCC 13, weight 8"
+# The paper's means, of its section 3.2 and table 2.
+_PAPER = {"rocky": ["7.50", "2.54", "102", "98.57", "87.96", "17.87"],
+          "flat": ["7.86", "3.94", "124", "84.44", "101.99", "25.88"]}
+
+
+def _mean(rows: list[list[str]], kind: str, engine: str) -> tuple[list[float], list[float]]:
+    """Means and worst of the six measures over the scenes of a kind."""
+    found = [[float(x) for x in row[2:8]] for row in rows if row[0].split()[0] == kind and row[1] == engine]
+    columns = list(zip(*found))
+    # A half is rounded up.
+    return [sum(c) / len(c) + 1e-9 for c in columns], [min(c) if i == 3 else max(c) for i, c in enumerate(columns)]
+
+
+def _rows(rows: list[list[str]], width: int) -> list[list[Any]]:
+    return [[*row, *[""] * width][:width] for row in rows]
+
+
+@simple("accuracy.mean", "accuracy")
+def accuracy_mean(r: dict[str, Any]) -> str:
+    rows = []
+    for kind, paper in _PAPER.items():
+        for engine in ("float", "float + both", _FIXED, f"{_FIXED} + both"):
+            mean, worst = _mean(r["scenes"], kind, engine)
+            rows.append([f"{kind}, mean (worst)", engine, *(f"{m:.2f} ({w:.2f})" for m, w in zip(mean, worst))])
+        rows.append([kind, "the paper", *paper])
+    return table(["scenes, 3 seeds", *_SCENE[1:]], rows)
+
+
+@simple("accuracy.scenes", "accuracy")
+def accuracy_scenes(r: dict[str, Any]) -> str:
+    return table(_SCENE + _BESIDE, _rows(r["scenes"], 12))
+
+
+@simple("accuracy.unseen", "accuracy")
+def accuracy_unseen(r: dict[str, Any]) -> str:
+    shown = [row for row in r["unseen"] if row[1] in ("float", _FIXED, f"{_FIXED} + both")]
+    rows = _rows(shown, 8)
+    for kind in _PAPER:
+        for engine in (_FIXED, f"{_FIXED} + both"):
+            mean, _ = _mean(r["unseen"], kind, engine)
+            rows.append([f"**{kind}, mean**", engine, *(f"{m:.{d}f}" for m, d in zip(mean, (2, 2, 1, 2, 1, 2)))])
+    return table(_SCENE, rows)
+
+
+@simple("accuracy.formats", "accuracy")
+def accuracy_formats(r: dict[str, Any]) -> str:
+    return table(_SCENE + _BESIDE, _rows(r["formats"], 12))
+
+
+_MEASURES = (("M1, RMS of errors up to 2 cm, mm", 2), ("M2.a, larger errors, %", 2), ("M2.b, their RMS, mm", 0),
+             ("M3, coverage, %", 2), ("M4, mean hole, px", 1), ("all errors, RMS, mm", 2))
+
+
+def _measures(r: dict[str, Any], both_only: bool) -> list[list[Any]]:
+    found = {(kind, clean): _mean(r["scenes"], kind, _FIXED + (" + both" if clean else ""))[0]
+             for kind in _PAPER for clean in (False, True)}
+    rows = []
+    for i, (title, digits) in enumerate(_MEASURES):
+        row = [title]
+        for kind, paper in _PAPER.items():
+            row += [f"{found[kind, clean][i]:.{digits}f}" for clean in ((True,) if both_only else (False, True))]
+            row.append(f"{float(paper[i]):.0f}" if i == 4 else paper[i])
+        rows.append(row)
+    return rows
+
+
+@simple("accuracy.readme", "accuracy")
+def accuracy_readme(r: dict[str, Any]) -> str:
+    return table(["", "rocky: ours", "with clean-up", "paper", "flat: ours", "with clean-up", "paper"],
+                 _measures(r, False))
+
+
+@simple("accuracy.datasheet", "accuracy")
+def accuracy_datasheet(r: dict[str, Any]) -> str:
+    return table(["", "rocky", "paper", "flat", "paper"], _measures(r, True))
+
+
 # ---- this machine
 
 @simple("fresh-machine")
@@ -334,7 +432,7 @@ def summary(records: Records, origins: Origins) -> str:
          lambda r: f"{r['all']['flips']:,}, " + (f"{r['all']['hang']} hang" if r["all"]["hang"] else "nothing hangs"),
          "`make flips`"),
         ("bits flipped in all registers of the chip, while tiles run over the link", "flips-chip",
-         lambda r: r["verdict"], "`make flips-chip`"),
+         _chip_verdict, "`make flips-chip`"),
         ("README's commands in a bare Debian root, seconds, packages included", "fresh-machine",
          lambda r: "; ".join(f"{s}: " + " + ".join(str(t) if not code else "FAILED" for t, code, _ in rows)
                              for s, rows in r["suites"].items()), "`make fresh-machine`"),

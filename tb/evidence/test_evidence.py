@@ -169,11 +169,16 @@ class Results(unittest.TestCase):
         with self.assertRaises(parsers.NothingFound):
             parsers.flips("flips: FAILED\n")
 
-    def test_flips_chip_in_either_form(self) -> None:
-        text = f"{'upset in':20} {'flips':>8} {'masked':>8}\n{'responder':20} {9:>8} {8:>8}\nflips: nothing hangs\n"
-        self.assertEqual(parsers.flips_chip(text)["tables"][0][1], ["responder", "9", "8"])
-        text = "| upset in | flips |\n|---|---|\n| responder | 9 |\n\nnothing hangs\n"
-        self.assertEqual(parsers.flips_chip(text)["tables"][0][1], ["responder", "9"])
+    def test_flips_chip(self) -> None:
+        head = f"{'upset in':34} {'flips':>7} {'masked':>8} {'silent':>8} {'hang':>8} {'clocks':>8}\n"
+        rows = "".join(f"{name:34} {9:>7} {8:>8} {1:>8} {0:>8} {77:>8}\n" for name in ("responder, state", "all"))
+        found = parsers.flips_chip(head + rows + "silent: responder, state: 3 4(2); again: --only 1:2:3\n" + head + rows)
+        self.assertEqual(found["rows"]["responder, state"],
+                         {"flips": 18, "masked": 16, "silent": 2, "hang": 0, "clocks": 77})
+        self.assertEqual(found["sites"], ["silent: responder, state: 3 4(2)"])
+        self.assertIn("- responder, state: 3 4(2)", tables.flips_chip(found))
+        with self.assertRaises(parsers.NothingFound):
+            parsers.flips_chip(head)
 
     def test_soak(self) -> None:
         text = ("soak: tiny: aborts and resets in idle 1, load 2, sweep 3, flush 4, unload 5\n"
