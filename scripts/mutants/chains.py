@@ -33,8 +33,8 @@ def unit(name: str) -> Test:
 
 
 def _soak(config: str) -> Test:
-    return Test(f"soak of {config}", f"engine_{config}", ("soak",), ("tb/soak/soak", "-a"), True, False, ("tb/soak/soak.cpp",),
-                "psweep", (("PSWEEP_CONFIG", config), ("PSWEEP_TILES", "150")),
+    return Test(f"soak of {config}", f"engine_{config}", ("soak",), ("tb/soak/soak", "-a"), True, False,
+                ("tb/soak/soak.cpp",), "psweep", (("PSWEEP_CONFIG", config), ("PSWEEP_TILES", "150")),
                 (f"tb/configs/{config}.json", "tb/replay/engine.cpp.in", "tb/replay/ports.pl"))
 
 

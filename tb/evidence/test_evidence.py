@@ -172,7 +172,8 @@ class Results(unittest.TestCase):
     def test_flips_chip(self) -> None:
         head = f"{'upset in':34} {'flips':>7} {'masked':>8} {'silent':>8} {'hang':>8} {'clocks':>8}\n"
         rows = "".join(f"{name:34} {9:>7} {8:>8} {1:>8} {0:>8} {77:>8}\n" for name in ("responder, state", "all"))
-        found = parsers.flips_chip(head + rows + "silent: responder, state: 3 4(2); again: --only 1:2:3\n" + head + rows)
+        sites = "silent: responder, state: 3 4(2); again: --only 1:2:3\n"
+        found = parsers.flips_chip(head + rows + sites + head + rows)
         self.assertEqual(found["rows"]["responder, state"],
                          {"flips": 18, "masked": 16, "silent": 2, "hang": 0, "clocks": 77})
         self.assertEqual(found["sites"], ["silent: responder, state: 3 4(2)"])
