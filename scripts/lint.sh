@@ -15,6 +15,8 @@
 #   units      every entity has a golden model, a test and a page
 #   tables     docs/<entity>.md: contract, diagram; generics and ports are those of the entity (lint_tables.pl)
 #   pages      tables of docs/dse.md are those of docs/dse/*.csv (scripts/dse/pages.py)
+#   evidence   blocks of README and docs are what docs/evidence/*.json makes of them, figures beyond them name their
+#              commit; what is stale is named, which is no failure (scripts/evidence.py)
 #   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
 #              (scripts/cmake/ghdl_netlist.vlt)
@@ -82,6 +84,10 @@ check_tables() {
 check_pages() {
   command -v python3 > /dev/null || skip "python3 is not installed" || return
   scripts/dse/pages.py --check
+}
+check_evidence() {
+  command -v python3 > /dev/null || skip "python3 is not installed" || return
+  scripts/evidence.py lint
 }
 check_trace() { scripts/lint_trace.pl; }
 
@@ -151,7 +157,7 @@ check_shell() {
   shellcheck --severity=warning "${scripts[@]}"
 }
 
-checks=(layout text links files analyse vhdl attributes units tables pages trace verilog format shell)
+checks=(layout text links files analyse vhdl attributes units tables pages evidence trace verilog format shell)
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
   --format)
@@ -170,7 +176,7 @@ for check in "${checks[@]}"; do
   # Not in a subshell: skip() leaves its reason.
   "check_$check" > "$scratch/output" 2>&1
   case $? in
-    0) passed=$((passed + 1)) ;;
+    0) passed=$((passed + 1)); grep '^note: ' "$scratch/output" | cut -c1-240 ;;
     77) skipped=$((skipped + 1)); echo "lint: $check: SKIPPED: $reason" ;;
     *) failed=$((failed + 1)); cat "$scratch/output"; echo "lint: $check: FAILED" ;;
   esac
