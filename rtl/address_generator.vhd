@@ -167,6 +167,10 @@ architecture rtl of address_generator is
   signal out_inside_x  : std_logic;
   signal out_loaded_x  : std_logic;
 
+  attribute use_dsp48 : string;
+
+  attribute use_dsp48 of product : signal is C_DSP;
+
   function floor_of (position : unsigned) return signed is
   begin
     return signed(position(31 downto C_POS_FRAC));
@@ -213,19 +217,39 @@ architecture rtl of address_generator is
 begin
 
   assert G_PLANES >= 1 and G_PLANES <= 1024
-    report "address_generator: G_PLANES=" & integer'image(G_PLANES) & " outside 1..1024"
+    report "address_generator: G_PLANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANES)
+           -- synthesis translate_on
+           & " outside 1..1024"
     severity failure;
   assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
-    report "address_generator: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    report "address_generator: G_IMG_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_COLS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
-    report "address_generator: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    report "address_generator: G_IMG_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_ROWS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
-    report "address_generator: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    report "address_generator: G_WEIGHT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WEIGHT_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_RECTIFIED = 0 or G_RECTIFIED = 1
-    report "address_generator: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    report "address_generator: G_RECTIFIED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_RECTIFIED)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
 
   row(0) <= s_row_first;

@@ -259,6 +259,10 @@ architecture rtl of control is
   signal window_errors_next  : unsigned(16 downto 0);
   signal tile_clocks_q       : unsigned(31 downto 0);
 
+  attribute fsm_extract : string;
+
+  attribute fsm_extract of state_q : signal is C_FSM_KEPT;
+
   -- value + 1, all ones stay.
   function plus_1_saturated (value : unsigned(15 downto 0)) return unsigned is
   begin
@@ -271,31 +275,67 @@ architecture rtl of control is
 begin
 
   assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
-    report "control: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    report "control: G_IMG_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_COLS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
-    report "control: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    report "control: G_IMG_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_ROWS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_PLANE_COLS >= 1 and G_PLANE_COLS <= 4096
-    report "control: G_PLANE_COLS=" & integer'image(G_PLANE_COLS) & " outside 1..4096"
+    report "control: G_PLANE_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANE_COLS)
+           -- synthesis translate_on
+           & " outside 1..4096"
     severity failure;
   assert G_PLANE_ROWS >= 1 and G_PLANE_ROWS <= 4096
-    report "control: G_PLANE_ROWS=" & integer'image(G_PLANE_ROWS) & " outside 1..4096"
+    report "control: G_PLANE_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANE_ROWS)
+           -- synthesis translate_on
+           & " outside 1..4096"
     severity failure;
   assert G_PLANES >= 1 and G_PLANES <= 1024
-    report "control: G_PLANES=" & integer'image(G_PLANES) & " outside 1..1024"
+    report "control: G_PLANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANES)
+           -- synthesis translate_on
+           & " outside 1..1024"
     severity failure;
   assert G_WINDOW >= 3 and G_WINDOW <= 21 and G_WINDOW mod 2 = 1
-    report "control: G_WINDOW=" & integer'image(G_WINDOW) & " outside 3..21 or even"
+    report "control: G_WINDOW"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WINDOW)
+           -- synthesis translate_on
+           & " outside 3..21 or even"
     severity failure;
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
-    report "control: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    report "control: G_MNCC_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MNCC_W)
+           -- synthesis translate_on
+           & " outside 4..16"
     severity failure;
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "control: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "control: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
   assert G_LATENCY >= 1 and G_LATENCY <= 125
-    report "control: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..125"
+    report "control: G_LATENCY"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LATENCY)
+           -- synthesis translate_on
+           & " outside 1..125"
     severity failure;
 
   is_idle   <= to_bit(state_q = C_IDLE);

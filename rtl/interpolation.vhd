@@ -132,16 +132,32 @@ architecture rtl of interpolation is
 begin
 
   assert G_PIX_W >= 1 and G_PIX_W <= 12
-    report "interpolation: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    report "interpolation: G_PIX_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PIX_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
-    report "interpolation: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    report "interpolation: G_WEIGHT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WEIGHT_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_INTERP_F >= 0 and G_INTERP_F <= 8
-    report "interpolation: G_INTERP_F=" & integer'image(G_INTERP_F) & " outside 0..8"
+    report "interpolation: G_INTERP_F"
+           -- synthesis translate_off
+           & "=" & integer'image(G_INTERP_F)
+           -- synthesis translate_on
+           & " outside 0..8"
     severity failure;
   assert G_RECTIFIED = 0 or G_RECTIFIED = 1
-    report "interpolation: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    report "interpolation: G_RECTIFIED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_RECTIFIED)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
 
   s0_fx  <= s_fx_right & s_fx_left;

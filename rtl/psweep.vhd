@@ -223,11 +223,19 @@ architecture rtl of psweep is
   signal cell_inside   : std_logic_vector(G_LANES - 1 downto 0);
   signal cell_textured : std_logic_vector(G_LANES - 1 downto 0);
   signal cell_v        : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
+
+  attribute max_fanout : string;
+
+  attribute max_fanout of pipe_rst, sweep_valid, sweep_row_first : signal is C_FANOUT;
 begin
 
   -- Ranges of the other generics are checked by the entities that use them.
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "psweep: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "psweep: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
 
   pipe_rst <= rst or map_abort;
