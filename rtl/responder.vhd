@@ -58,6 +58,7 @@ entity responder is
     full_duplex     : out std_logic;
     session         : out std_logic;
     events          : out std_logic_vector(39 downto 0);
+    tick_ms         : out std_logic; -- pulse each millisecond of clk
 
     -- packet_rx
     m_valid  : in  std_logic;
@@ -1180,6 +1181,7 @@ begin
 
   events(15 downto 0)  <= (others => '0');
   events(21 downto 18) <= (others => '0');
+  tick_ms              <= ms_tick;
   events(29)           <= '0';
   events(33 downto 32) <= (others => '0');
   events(39 downto 36) <= (others => '0');

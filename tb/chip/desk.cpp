@@ -14,6 +14,7 @@ LinkSettings link_settings(const DeskSettings& s) {
   LinkSettings link;
   link.half_duplex = s.half_duplex;
   link.delay = s.medium_delay;
+  link.echo = s.half_duplex ? s.echo : -1;
   link.seed = s.seed;
   return link;
 }
@@ -108,7 +109,7 @@ void Desk::rx_edge() {
       if (on_frame) on_frame(frame);
     }
   }
-  if (mii_clocks_) chip_->rx_edge(link_.rx_clock(), now_);
+  if (mii_clocks_ && rx_clock_) chip_->rx_edge(link_.rx_clock(), now_);
   if (wave_ && wave_->tile >= 0 && chip_->launches() > wave_->tile) open_wave();
 }
 
@@ -144,6 +145,7 @@ void Desk::frame_ends(bool from_chip, bool good, const net::Bytes& frame) {
       recorded_.pop_front();
     }
   }
+  if (on_wire && good && net::fcs_good(frame)) on_wire(from_chip, net::Bytes(frame.begin(), frame.end() - 4));
   if (from_chip && good && plugged_) {
     net::Bytes bare(frame.begin(), frame.end() - 4);
     from_chip_.put(std::move(bare), now_);

@@ -4,6 +4,7 @@
 // carrier and repeats after a collision.
 #pragma once
 #include <deque>
+#include <optional>
 #include <random>
 
 #include "chip/chip_model.hpp"
@@ -27,6 +28,7 @@ class EchoChip : public ChipModel {
   }
   void rx_edge(const MiiSample& pins, Time at) override {
     if (at < last_edge_) ++disorder_;
+    now_ = at;
     if (!pins.valid || reset_) {
       if (!in_.empty()) answer();
       in_.clear();
@@ -41,6 +43,7 @@ class EchoChip : public ChipModel {
   }
   MiiSample tx_edge(Time at) override {
     if (at < last_edge_) ++disorder_;
+    now_ = at;
     const MiiSample shown = out_;
     if (sending_ && half_ && collision_) {
       jam_ = 8;
@@ -66,6 +69,12 @@ class EchoChip : public ChipModel {
       ++gap_;
       if (half_ && carrier_) gap_ = 0;
       if (wait_ > 0) --wait_;
+      if (answers_.empty()) {
+        if (auto frame = unasked()) {
+          net::append_fcs(*frame);
+          answers_.push_back(std::move(*frame));
+        }
+      }
       if (!answers_.empty() && gap_ >= 24 && wait_ == 0) {
         sending_ = true;
         at_ = damage == Damage::kPreamble ? 1 : 0;
@@ -89,6 +98,14 @@ class EchoChip : public ChipModel {
   uint64_t good_frames() const { return good_; }
   uint64_t bad_frames() const { return bad_; }
 
+ protected:
+  // The payload that answers this one, if any.
+  virtual std::optional<net::Bytes> reply(const net::UdpPacket& udp) { return udp.payload; }
+  // A frame that nobody waits for, when there is nothing else to send.
+  virtual std::optional<net::Bytes> unasked() { return std::nullopt; }
+  Time now() const { return now_; }
+  const net::Address& own() const { return own_; }
+
  private:
   void answer() {
     net::Bytes f;
@@ -106,7 +123,9 @@ class EchoChip : public ChipModel {
       to.ip = net::get32(f, 28);
       out = net::make_arp_reply(own_, to);
     } else if (auto udp = net::parse_udp(f)) {
-      out = net::make_udp(udp->to, udp->from, udp->payload);
+      const auto payload = reply(*udp);
+      if (!payload) return;
+      out = net::make_udp(udp->to, udp->from, *payload);
     } else if (f[23] == net::kProtocolIcmp && net::ones_sum(f.data() + 14, 20) == 0xffff) {
       const size_t length = net::get16(f, 16);
       if (length < 28 || 14 + length > f.size() || net::ones_sum(f.data() + 34, length - 20) != 0xffff) return;
@@ -129,7 +148,7 @@ class EchoChip : public ChipModel {
   MiiSample out_;
   size_t at_ = 0;
   int jam_ = 0, gap_ = 0, wait_ = 0;
-  Time last_edge_ = -1;
+  Time last_edge_ = -1, now_ = 0;
   int64_t clocks_ = 0, disorder_ = 0;
   uint64_t good_ = 0, bad_ = 0;
   std::mt19937 random_{7};

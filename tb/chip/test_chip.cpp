@@ -546,7 +546,7 @@ DeskSettings slow_settings(const Chip& chip) {  // fewer clocks a frame; a milli
 
 TEST_CASE("chip: answers are not answered: two chips and one spoofed frame, a frame from the chip itself") {
   const Chip& chip = chip_named("tiny");
-  const uint8_t type = GENERATE(0x05, 0x85, 0x8c, 0x7f, 0xff);
+  const auto type = static_cast<uint8_t>(GENERATE(0x05, 0x85, 0x8c, 0x7f, 0xff));
   INFO("type " << int(type));
   {
     DeskSettings s = slow_settings(chip);
@@ -752,7 +752,7 @@ TEST_CASE("chip: no stranger's message has an answer longer than itself") {
   Crowd crowd(b.desk, b.address);
   uint32_t token = open ? crowd.open(kHost) : 0x12345679;
   int asked = 0, answered = 0;
-  for (const uint8_t version : {1, 2}) {
+  for (const uint8_t version : {uint8_t{1}, uint8_t{2}}) {
     for (const size_t length : {16, 20, 143, 144, 175, 176}) {
       for (int type = 0; type <= 13; ++type) {
         if (version == 1 && (length > 20 || type > 5)) continue;
