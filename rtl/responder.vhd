@@ -1195,7 +1195,7 @@ begin
   end process p_time;
 
   lapse       <= ms_tick and to_bit(quiet_ms = G_SESSION_MS - 1);
-  stuck       <= (expired or not open_q) and (lapse or quiet_ms(10));
+  stuck       <= (expired and ms_tick) or (not open_q and (lapse or quiet_ms(10)));
   full_duplex <= duplex_mode(1) or (pin_full_duplex and not duplex_mode(0));
   session     <= open_q;
 

@@ -87,12 +87,12 @@ def bits_text(bits):
 
 
 def page_block(groups, total, sites):
-    rows = ["| upset in | flips | masked | of them resent | repeated | session | error | silent | hang | clocks | silence |",
-            "|---|---|---|---|---|---|---|---|---|---|---|"]
+    columns = ("upset in", "flips", "masked", "of them resent") + VERDICTS[1:] + ("clocks", "silence")
+    rows = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
     for name, c in sorted(groups.items()) + [("all", total)]:
         v = c.verdict
-        rows.append(f"| {name} | {c.flips} | {v['masked']} | {c.resent} | {v['repeated']} | {v['session']} | {v['error']} | "
-                    f"{v['silent']} | {v['hang']} | {c.clocks} | {c.silence} |")
+        cells = [name, c.flips, v["masked"], c.resent] + [v[w] for w in VERDICTS[1:]] + [c.clocks, c.silence]
+        rows.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     rows += ["", "Registers outside the engine whose upset made a silent wrong cell, with the number of upsets:", ""]
     outer = collections.Counter()
     inner = 0

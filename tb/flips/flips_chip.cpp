@@ -713,6 +713,8 @@ class Campaign {
         }
       }
     }
+    // In random order: what is done when the campaign is stopped stands for all of it.
+    std::shuffle(all.begin(), all.end(), random);
     std::vector<Upset> mine;
     for (size_t i = 0; i < all.size(); ++i)
       if (static_cast<int>(i) % options_.parts == options_.part) mine.push_back(all[i]);

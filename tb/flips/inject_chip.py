@@ -7,8 +7,8 @@
 IN.v is what GHDL makes of psweep_top. In OUT.v
   - every instance has a module of its own, so that an upset hits one of them, however often its entity is used;
   - registers take their values at both edges of their clock: one evaluation each, not two;
-  - the top has three more inputs: at the edge at which flip_site is the number of a register, what that register takes is
-    changed where flip_mask (flip_wide, if it has more than 64 bits) has ones. 0: nothing happens.
+  - the top has three more inputs: at the edge at which flip_site is the number of a register, what that register takes
+    is changed where flip_mask (flip_wide, if it has more than 64 bits) has ones. 0: nothing happens.
 SITES.inc has a line for each register: {entity, name with the path of instances, bits, clock (0 clk, 1 mii_rx_clk,
 2 mii_tx_clk)}, number 1 first. Words of RAMs are no registers; what they are read into is.
 Anything that is not understood ends the script: no register may get lost.
