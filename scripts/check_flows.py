@@ -903,8 +903,7 @@ def fusesoc(work):
     (user / "user.core").write_text(
         "CAPI=2:\nname: somebody:else:user:1.0\nfilesets:\n  rtl:\n    depend: [psweep:stereo:engine]\n"
         "    files: [user.vhd]\n    file_type: vhdlSource-93\ntargets:\n  default:\n    filesets: [rtl]\n"
-        "    toplevel: user\n    default_tool: ghdl\n    tools: {ghdl: {analyze_options: [-frelaxed],\n"
-        "      run_options: [--ieee-asserts=disable]}}\n")
+        "    toplevel: user\n    default_tool: ghdl\n    tools: {ghdl: {run_options: [--ieee-asserts=disable]}}\n")
     ports = [(n, d, t) for n, d, t in project.ports_of("psweep") if d == "in"]
     (user / "user.vhd").write_text(
         "library ieee;\n  use ieee.std_logic_1164.all;\nentity user is end entity;\narchitecture a of user is\nbegin\n"
