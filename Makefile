@@ -61,6 +61,11 @@ flips: setup ## Upsets of single bits in control, plane table, map: nothing hang
 	@scripts/build.sh flips
 	@scripts/flips.sh $(if $(ALL),--all) $(if $(SEED),--seed $(SEED))
 
+.PHONY: flips-chip
+flips-chip: setup ## 20,000 upsets of the whole chip while tiles run over the link: nothing hangs (10 minutes)   COUNT=n SEED=n
+	@scripts/build.sh chip_flips
+	@scripts/flips_chip.py $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED))
+
 .PHONY: soak
 soak: setup ## Random tiles, good and bad, with stalls and resets: all is counted   TILES=10000 SEED=n
 	@scripts/build.sh soak

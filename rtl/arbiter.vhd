@@ -7,6 +7,9 @@
 --               in ram_dc with their toggles, and levels that hardly ever change (constraints/)
 --   Buffering : rows of the next tile arrive and the map of the last one leaves while a tile is swept. G_ROW_SLOTS and
 --               G_MAP_DEPTH say how much of them has room (docs/arbiter.md)
+--   Clocks of : clock_missing(0) rx_clk, (1) tx_clk: has not ticked from one millisecond of clk to the next, which the
+--   the PHY     counters 37 and 38 count; '0' again with the millisecond after it has come back. Nothing waits for
+--               them but what passes through them: without tx_clk no frame is sent, without rx_clk none is received
 --   Protocol  : docs/protocol.md
 --   Reset     : synchronous, one for each clock
 --   Golden    : sw/golden/arbiter.hpp
@@ -60,6 +63,7 @@ entity arbiter is
     pin_full_duplex : in  std_logic; -- still, or slow: synchronised here
     pin_speed_100   : in  std_logic;
     session         : out std_logic;
+    clock_missing   : out std_logic_vector(1 downto 0); -- rx_clk, tx_clk
 
     -- The engine.
     m_cfg_tvalid : out std_logic;
@@ -124,16 +128,25 @@ architecture rtl of arbiter is
   signal m_done         : std_logic;
   signal r_addr         : std_logic_vector(10 downto 0);
   signal r_data         : std_logic_vector(7 downto 0);
-  signal rx_events      : std_logic_vector(15 downto 0);
+  signal rx_events      : std_logic_vector(18 downto 0);
   signal full_duplex    : std_logic;
   signal duplex_q       : std_logic;
-  signal msg_events     : std_logic_vector(31 downto 0);
+  signal half_duplex    : std_logic;
+  signal sending        : std_logic;
+  signal tick_ms        : std_logic;
+  signal ticks          : std_logic_vector(1 downto 0);
+  signal ticks_q        : std_logic_vector(1 downto 0);
+  signal ticks_last     : std_logic_vector(1 downto 0);
+  signal ticked         : std_logic_vector(1 downto 0); -- since the last millisecond
+  signal missing        : std_logic_vector(1 downto 0);
+  signal msg_events     : std_logic_vector(39 downto 0);
   signal pins           : std_logic_vector(1 downto 0);
   signal pins_q         : std_logic_vector(1 downto 0);
   signal s_ready        : std_logic;
   signal s_start        : std_logic;
   signal s_kind         : std_logic_vector(1 downto 0);
   signal s_bank         : std_logic;
+  signal tx_abort       : std_logic;
   signal p_valid        : std_logic;
   signal p_ready        : std_logic;
   signal p_data         : std_logic_vector(7 downto 0);
@@ -173,7 +186,7 @@ architecture rtl of arbiter is
   signal f_take         : std_logic;
   signal f_data         : std_logic_vector(7 downto 0);
   signal f_last         : std_logic;
-  signal c_index        : std_logic_vector(4 downto 0);
+  signal c_index        : std_logic_vector(5 downto 0);
   signal c_valid        : std_logic;
   signal c_data         : std_logic_vector(31 downto 0);
   signal job_we         : std_logic;
@@ -189,14 +202,23 @@ architecture rtl of arbiter is
   signal run_tile       : std_logic_vector(15 downto 0);
   signal failed         : std_logic;
   signal failed_tile    : std_logic_vector(15 downto 0);
+  signal tile_failed    : std_logic;
+  signal row_lost       : std_logic;
+  signal map_lost       : std_logic;
+  signal lost           : std_logic;
+  signal starved        : std_logic;
+  signal recovered      : std_logic;
   signal engine_wait    : std_logic;
-  signal events         : std_logic_vector(31 downto 0);
+  signal events         : std_logic_vector(39 downto 0);
   signal ev_sent        : std_logic;
   signal ev_late        : std_logic;
   signal ev_excessive   : std_logic;
-  signal collisions     : std_logic_vector(0 downto 0);
-  signal collision_seen : std_logic_vector(1 downto 0);
-  signal collision_last : std_logic;
+  signal ev_deferred    : std_logic;
+  signal ev_recovered   : std_logic;
+  signal flips          : std_logic_vector(2 downto 0); -- toggles of mac_tx: collision, recovered, resynchronised
+  signal flips_seen     : std_logic_vector(2 downto 0);
+  signal flips_last     : std_logic_vector(2 downto 0);
+  signal flipped        : std_logic_vector(2 downto 0);
   signal f_request      : std_logic_vector(1 downto 0);
   signal f_length_0     : std_logic_vector(10 downto 0);
   signal f_length_1     : std_logic_vector(10 downto 0);
@@ -219,27 +241,42 @@ architecture rtl of arbiter is
 begin
 
   assert C_CHUNK_PAIRS >= 1 and C_CHUNK_CELLS >= 1
-    report "arbiter: G_CHUNK_BYTES=" & integer'image(G_CHUNK_BYTES) & " holds no pair or no cell"
+    report "arbiter: G_CHUNK_BYTES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_BYTES)
+           -- synthesis translate_on
+           & " holds no pair or no cell"
     severity failure;
   assert G_ROW_SLOTS >= 0 and G_ROW_SLOTS /= 1
-    report "arbiter: G_ROW_SLOTS=" & integer'image(G_ROW_SLOTS) & " is neither 0 nor from 2 on"
+    report "arbiter: G_ROW_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_ROW_SLOTS)
+           -- synthesis translate_on
+           & " is neither 0 nor from 2 on"
     severity failure;
   assert G_MAP_DEPTH >= 0
-    report "arbiter: G_MAP_DEPTH=" & integer'image(G_MAP_DEPTH) & " below 0"
+    report "arbiter: G_MAP_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAP_DEPTH)
+           -- synthesis translate_on
+           & " below 0"
     severity failure;
 
   -- Receive -----------------------------------------------------------------------------------------------------------
   u_mac_rx : entity work.mac_rx
     port map (
-      clk       => rx_clk,
-      rst       => rx_rst,
-      mii_rxd   => mii_rxd,
-      mii_rx_dv => mii_rx_dv,
-      mii_rx_er => mii_rx_er,
-      m_valid   => byte_valid,
-      m_ready   => byte_ready,
-      m_last    => byte_word(8),
-      m_data    => byte_word(7 downto 0)
+      clk         => rx_clk,
+      rst         => rx_rst,
+      full_duplex => duplex_q,
+      sending     => sending,
+      mii_rxd     => mii_rxd,
+      mii_rx_dv   => mii_rx_dv,
+      mii_rx_er   => mii_rx_er,
+      m_valid     => byte_valid,
+      m_ready     => byte_ready,
+      m_last      => byte_word(8),
+      m_data      => byte_word(7 downto 0),
+      tick        => ticks(0)
     );
 
   u_fifo : entity work.async_fifo
@@ -266,22 +303,25 @@ begin
       G_UDP_PORT => G_UDP_PORT
     )
     port map (
-      clk      => clk,
-      rst      => rst,
-      s_valid  => rx_valid,
-      s_ready  => rx_ready,
-      s_last   => rx_word(8),
-      s_data   => rx_word(7 downto 0),
-      own_mac  => own_mac,
-      own_ip   => own_ip,
-      m_valid  => m_valid,
-      m_kind   => m_kind,
-      m_length => m_length,
-      m_done   => m_done,
-      r_addr   => r_addr,
-      r_data   => r_data,
-      events   => rx_events
+      clk         => clk,
+      rst         => rst,
+      s_valid     => rx_valid,
+      s_ready     => rx_ready,
+      s_last      => rx_word(8),
+      s_data      => rx_word(7 downto 0),
+      own_mac     => own_mac,
+      own_ip      => own_ip,
+      half_duplex => half_duplex,
+      m_valid     => m_valid,
+      m_kind      => m_kind,
+      m_length    => m_length,
+      m_done      => m_done,
+      r_addr      => r_addr,
+      r_data      => r_data,
+      events      => rx_events
     );
+
+  half_duplex <= not duplex_q;
 
   -- Messages ----------------------------------------------------------------------------------------------------------
   pins <= pin_speed_100 & pin_full_duplex;
@@ -327,6 +367,7 @@ begin
       full_duplex     => full_duplex,
       session         => session,
       events          => msg_events,
+      tick_ms         => tick_ms,
       m_valid         => m_valid,
       m_kind          => m_kind,
       m_length        => m_length,
@@ -337,6 +378,7 @@ begin
       s_start         => s_start,
       s_kind          => s_kind,
       s_bank          => s_bank,
+      tx_abort        => tx_abort,
       p_valid         => p_valid,
       p_ready         => p_ready,
       p_data          => p_data,
@@ -404,7 +446,7 @@ begin
 
   u_counters : entity work.counters
     generic map (
-      G_COUNT => 32
+      G_COUNT => 40
     )
     port map (
       clk     => clk,
@@ -415,32 +457,75 @@ begin
       r_data  => c_data
     );
 
-  events(15 downto 0)  <= rx_events;
+  events(15 downto 0)  <= rx_events(15 downto 0);
   events(17 downto 16) <= msg_events(17 downto 16);
   events(18)           <= ev_sent;
-  events(19)           <= collision_seen(1) xor collision_last;
+  events(19)           <= flipped(0);
   events(20)           <= ev_late;
   events(21)           <= ev_excessive;
-  events(31 downto 22) <= msg_events(31 downto 22);
+  events(28 downto 22) <= msg_events(28 downto 22);
+  events(29)           <= rx_events(16);
+  events(31 downto 30) <= msg_events(31 downto 30);
+  events(32)           <= rx_events(17);
+  events(33)           <= ev_deferred;
+  events(34)           <= msg_events(34);
+  events(35)           <= msg_events(35) or ev_recovered or flipped(1) or recovered;
+  events(36)           <= rx_events(18) or flipped(2);
+  events(38 downto 37) <= not ticked and not missing and (tick_ms & tick_ms);
+  events(39)           <= tile_failed;
 
-  collision_seen(0) <= '0';
-
-  u_collision : entity work.cdc_sync
+  u_flips : entity work.cdc_sync
     generic map (
-      G_WIDTH => 1
+      G_WIDTH => 3
     )
     port map (
       clk => clk,
-      d   => collisions,
-      q   => collision_seen(1 downto 1)
+      d   => flips,
+      q   => flips_seen
     );
 
-  p_collision : process (clk)
+  flipped <= flips_seen xor flips_last;
+
+  p_flips : process (clk)
   begin
     if rising_edge(clk) then
-      collision_last <= collision_seen(1);
+      flips_last <= flips_seen;
     end if;
-  end process p_collision;
+  end process p_flips;
+
+  -- Clocks of the PHY -------------------------------------------------------------------------------------------------
+  u_ticks : entity work.cdc_sync
+    generic map (
+      G_WIDTH => 2
+    )
+    port map (
+      clk => clk,
+      d   => ticks,
+      q   => ticks_q
+    );
+
+  clock_missing <= missing;
+
+  p_missing : process (clk)
+  begin
+    if rising_edge(clk) then
+      ticks_last <= ticks_q;
+      if tick_ms = '1' then
+        missing <= not ticked;
+        ticked  <= "00";
+      end if;
+      if ticks_q(0) /= ticks_last(0) then
+        ticked(0) <= '1';
+      end if;
+      if ticks_q(1) /= ticks_last(1) then
+        ticked(1) <= '1';
+      end if;
+      if rst = '1' then
+        missing <= "00";
+        ticked  <= "11";
+      end if;
+    end if;
+  end process p_missing;
 
   -- Transmit ----------------------------------------------------------------------------------------------------------
   u_packet_tx : entity work.packet_tx
@@ -456,6 +541,7 @@ begin
       s_start      => s_start,
       s_kind       => s_kind,
       s_bank       => s_bank,
+      s_abort      => tx_abort,
       p_valid      => p_valid,
       p_ready      => p_ready,
       p_data       => p_data,
@@ -467,6 +553,7 @@ begin
       ram_we       => frame_we,
       ram_waddr    => frame_waddr,
       ram_wdata    => frame_wdata,
+      tx_rst       => tx_rst,
       f_request    => f_request,
       f_length_0   => f_length_0,
       f_length_1   => f_length_1,
@@ -475,7 +562,9 @@ begin
       f_result_1   => f_result_1,
       ev_sent      => ev_sent,
       ev_excessive => ev_excessive,
-      ev_late      => ev_late
+      ev_late      => ev_late,
+      ev_deferred  => ev_deferred,
+      ev_recovered => ev_recovered
     );
 
   -- What crosses has to come from a flip-flop: a gate may glitch at the very edge.
@@ -506,22 +595,26 @@ begin
       G_SEED => G_SEED
     )
     port map (
-      clk         => tx_clk,
-      rst         => tx_rst,
-      full_duplex => duplex_q,
-      mii_crs     => mii_crs,
-      mii_col     => mii_col,
-      mii_txd     => mii_txd,
-      mii_tx_en   => mii_tx_en,
-      f_request   => f_request,
-      f_length_0  => f_length_0,
-      f_length_1  => f_length_1,
-      f_done      => f_done,
-      f_result_0  => f_result_0,
-      f_result_1  => f_result_1,
-      collisions  => collisions(0),
-      r_addr      => frame_raddr,
-      r_data      => frame_rdata
+      clk            => tx_clk,
+      rst            => tx_rst,
+      full_duplex    => duplex_q,
+      mii_crs        => mii_crs,
+      mii_col        => mii_col,
+      mii_txd        => mii_txd,
+      mii_tx_en      => mii_tx_en,
+      sending        => sending,
+      f_request      => f_request,
+      f_length_0     => f_length_0,
+      f_length_1     => f_length_1,
+      f_done         => f_done,
+      f_result_0     => f_result_0,
+      f_result_1     => f_result_1,
+      collisions     => flips(0),
+      r_addr         => frame_raddr,
+      r_data         => frame_rdata,
+      recovered      => flips(1),
+      resynchronised => flips(2),
+      tick           => ticks(1)
     );
 
   -- Tiles -------------------------------------------------------------------------------------------------------------
@@ -538,7 +631,10 @@ begin
       open_tile   => row_open,
       open_pixels => row_pixels,
       open_chunks => row_chunks,
+      fail        => tile_failed,
+      recovered   => row_lost,
       busy        => row_busy,
+      staged      => staged,
       base        => row_base,
       received    => row_received,
       w_check     => w_check,
@@ -577,27 +673,19 @@ begin
       cfg_tdata   => m_cfg_tdata,
       engine_busy => engine_busy,
       map_last    => map_last,
+      starved     => starved,
+      lost        => lost,
       go          => go,
       running     => running,
       run_tile    => run_tile,
       failed      => failed,
-      failed_tile => failed_tile
+      failed_tile => failed_tile,
+      tile_failed => tile_failed,
+      recovered   => recovered
     );
 
-  -- From START until the scheduler has launched it.
-  p_staged : process (clk)
-  begin
-    if rising_edge(clk) then
-      if row_open = '1' then
-        staged <= '1';
-      elsif go = '1' then
-        staged <= '0';
-      end if;
-      if rst = '1' or stop = '1' then
-        staged <= '0';
-      end if;
-    end if;
-  end process p_staged;
+  lost    <= row_lost or map_lost;
+  starved <= m_pix_tready and not row_busy;
 
   u_map_buffer : entity work.map_buffer
     generic map (
@@ -615,6 +703,8 @@ begin
       s_tlast     => s_map_tlast,
       release_map => map_release,
       clear       => map_clear,
+      fail        => tile_failed,
+      recovered   => map_lost,
       keep        => map_keep,
       started     => map_started,
       busy        => map_busy,

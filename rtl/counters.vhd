@@ -18,13 +18,13 @@ library ieee;
 
 entity counters is
   generic (
-    G_COUNT : integer := 32
+    G_COUNT : integer := 40
   );
   port (
     clk     : in  std_logic;
     rst     : in  std_logic;
     events  : in  std_logic_vector(G_COUNT - 1 downto 0);
-    r_index : in  std_logic_vector(4 downto 0);
+    r_index : in  std_logic_vector(5 downto 0);
     r_valid : out std_logic;
     r_data  : out std_logic_vector(31 downto 0)
   );
@@ -52,15 +52,19 @@ architecture rtl of counters is
   signal waddr    : std_logic_vector(C_INDEX_W downto 0);
   signal raddr    : std_logic_vector(C_INDEX_W downto 0);
   signal rdata    : std_logic_vector(15 downto 0);
-  signal index_q  : std_logic_vector(4 downto 0);
+  signal index_q  : std_logic_vector(5 downto 0);
   signal same     : std_logic;
   signal half     : std_logic; -- the lower half of r_index is there
   signal have     : std_logic;
 
 begin
 
-  assert G_COUNT >= 1 and G_COUNT <= 32
-    report "counters: G_COUNT=" & integer'image(G_COUNT) & " outside 1..32"
+  assert G_COUNT >= 1 and G_COUNT <= 64
+    report "counters: G_COUNT"
+           -- synthesis translate_off
+           & "=" & integer'image(G_COUNT)
+           -- synthesis translate_on
+           & " outside 1..64"
     severity failure;
 
   four     <= scan(C_INDEX_W - 1 downto 2);

@@ -18,6 +18,7 @@ updating.vhd
 psweep.vhd
 cdc_sync.vhd
 reset_sync.vhd
+reset_filter.vhd
 ram_dc.vhd
 async_fifo.vhd
 eth_pkg.vhd

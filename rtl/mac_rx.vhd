@@ -10,9 +10,14 @@
 --   Rate     : a byte every 2 clocks, the verdict within 1 clock of the last byte; frames may follow one clock after
 --              the other
 --   Latency  : 2 clocks from the second nibble of a byte to its beat, from rx_dv = '0' to the verdict
+--   Own frame: in half duplex a stretch of rx_dv in which `sending` is seen before the SFD is not received: a PHY that
+--              loops the station's own frames back (as those of 10BASE-T do), or a collision
 --   Contract : a beat shown holds until it is taken. It need not be taken at once, but 2 clocks later the next byte
 --              comes and is lost if there is no room. The verdict is never lost: it waits; a frame whose rx_dv rises
 --              while it waits is not received.
+--   Crossings: full_duplex and sending are synchronised here
+--   Upsets   : hunting, in_frame and ended have no code that lasts: whatever they are, the end of rx_dv and of the
+--              verdict leads back to the start. tick flips with each clock, which shows that there is one
 --   Reset    : nothing shown; what is left of a frame in progress is not received
 --   Golden   : sw/golden/mac_rx.hpp
 library ieee;
@@ -23,21 +28,29 @@ library ieee;
 
 entity mac_rx is
   port (
-    clk       : in  std_logic;
-    rst       : in  std_logic;
-    mii_rxd   : in  std_logic_vector(3 downto 0);
-    mii_rx_dv : in  std_logic;
-    mii_rx_er : in  std_logic;
-    m_valid   : out std_logic;
-    m_ready   : in  std_logic;
-    m_last    : out std_logic;
-    m_data    : out std_logic_vector(7 downto 0)
+    clk         : in  std_logic;
+    rst         : in  std_logic;
+    full_duplex : in  std_logic;
+    sending     : in  std_logic; -- of mac_tx
+    mii_rxd     : in  std_logic_vector(3 downto 0);
+    mii_rx_dv   : in  std_logic;
+    mii_rx_er   : in  std_logic;
+    m_valid     : out std_logic;
+    m_ready     : in  std_logic;
+    m_last      : out std_logic;
+    m_data      : out std_logic_vector(7 downto 0);
+    tick        : out std_logic
   );
 end entity mac_rx;
 
 architecture rtl of mac_rx is
 
   constant C_MAX : unsigned(10 downto 0) := to_unsigned(1518, 11);
+
+  signal levels       : std_logic_vector(1 downto 0);
+  signal synchronised : std_logic_vector(1 downto 0);
+  signal own          : std_logic; -- the station itself sends, in half duplex
+  signal ticked       : std_logic;
 
   -- Pins, registered at the edge of the device.
   signal nibble : std_logic_vector(3 downto 0);
@@ -66,7 +79,27 @@ architecture rtl of mac_rx is
   signal room     : std_logic;
   signal valid    : std_logic;
 
+  attribute iob : string;
+
+  attribute iob of nibble, dv, er : signal is C_PAD;
+
 begin
+
+  levels <= full_duplex & sending;
+
+  u_levels : entity work.cdc_sync
+    generic map (
+      G_WIDTH  => 2,
+      G_STAGES => 2
+    )
+    port map (
+      clk => clk,
+      d   => levels,
+      q   => synchronised
+    );
+
+  own  <= synchronised(0) and not synchronised(1);
+  tick <= ticked;
 
   m_valid  <= valid;
   room     <= not valid or m_ready;
@@ -82,6 +115,7 @@ begin
   p_frame : process (clk)
   begin
     if rising_edge(clk) then
+      ticked <= not ticked;
       nibble <= mii_rxd;
       dv     <= mii_rx_dv;
       er     <= mii_rx_er;
@@ -91,9 +125,9 @@ begin
       end if;
 
       after_5 <= dv and to_bit(nibble = "0101");
-      if hunting = '1' and after_5 = '1' and dv = '1' and nibble = "1101" then
+      if hunting = '1' and dv = '1' and (own = '1' or (after_5 = '1' and nibble = "1101")) then
         hunting  <= '0';
-        in_frame <= '1';
+        in_frame <= not own;
       end if;
       if dv = '1' and er = '1' and ended = '0' then
         error <= '1';
@@ -147,6 +181,7 @@ begin
         valid    <= '0';
         hunting  <= '0';
         in_frame <= '0';
+        ticked   <= '0';
       end if;
     end if;
   end process p_frame;

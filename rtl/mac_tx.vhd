@@ -6,6 +6,9 @@
 --              of tx_en or crs (of crs: two clocks of synchronisation and two of output come on top). crs in the first
 --              15 starts the gap again, later it does not; a frame that waits when the gap ends goes out whatever crs
 --              says then (4.2.3.2.1, where the first part is up to 2/3 of the gap).
+--   Deferral : a frame that has waited for the gap for 2**14 nibbles (up to 16 fewer) in a row is given up: 65,536 bit
+--              times. The standard's maxDeferTime, two frames of the largest size (24,288 bit times), ends nothing
+--              there, it only counts; on a busy medium stations may rightfully go first for longer than that
 --   Collision: col in nibble 0 .. 127 of a transmission (preamble included): preamble and SFD are completed, then come
 --              8 nibbles of jam (all 5), and the frame is sent again after 0 .. 2**min(n, 10) - 1 slots of 128 nibbles
 --              from the end of the jam and a gap, n = number of its collisions; given up at the 16th. From nibble 128
@@ -16,13 +19,20 @@
 --              fourth bit, hence at different bits, and cannot cancel.
 --   Slots    : served 0, 1, 0, 1 ..; f_request(s) /= f_done(s): frame waits, f_length_s (14 .. 1514 bytes without FCS)
 --              and its bytes stay still. f_done(s) flips when the frame is over, f_result_s (from the same clock on) is
---              0 sent, 1 given up after 16 collisions, 2 late collision. collisions flips at each collision.
+--              0 sent, 1 given up after 16 collisions, 2 late collision, 3 given up after too long a deferral.
+--              collisions flips at each collision.
+--   Upsets   : more than one state at a time: none instead, the frame is sent again from its beginning, recovered flips.
+--              If only the slot waits whose turn it is not, it has its turn, and resynchronised flips: that happens only
+--              if one of the two counts of turns was upset, as requests arrive in the order in which they were made.
+--              f_done(s) becomes f_request(s), not the other value of itself, so that no upset of either outlasts a
+--              frame. tick flips while there is a clock.
 --   Latency  : 2 clocks from a state to the pins; r_data is used one clock after r_addr
 --   Crossings: full_duplex, mii_crs, mii_col and f_request are synchronised here (one clock of doubt). full_duplex may
 --              change at any time: it only decides whether crs and col are looked at.
 --   Structure: one counter for nibbles of all states, whose upper bits count the slots of the backoff and are compared
 --              with as many bits of the LFSR (which stands still meanwhile) as there are ones in the shift register of
 --              attempts. One hot state. The CRC's index nibble also makes txd: nibble = index xor crc.
+--   Sending  : '1' with mii_tx_en, a clock earlier, for mac_rx
 --   Reset    : nothing is sent, a frame in transmission is cut off; f_done = f_request = 0 is the empty state
 --   Golden   : sw/golden/mac_tx.hpp
 library ieee;
@@ -43,6 +53,7 @@ entity mac_tx is
     mii_col     : in  std_logic;
     mii_txd     : out std_logic_vector(3 downto 0);
     mii_tx_en   : out std_logic;
+    sending     : out std_logic;
     f_request   : in  std_logic_vector(1 downto 0);
     f_length_0  : in  std_logic_vector(10 downto 0);
     f_length_1  : in  std_logic_vector(10 downto 0);
@@ -51,7 +62,11 @@ entity mac_tx is
     f_result_1  : out std_logic_vector(1 downto 0);
     collisions  : out std_logic;
     r_addr      : out std_logic_vector(11 downto 0);
-    r_data      : in  std_logic_vector(7 downto 0)
+    r_data      : in  std_logic_vector(7 downto 0);
+
+    recovered      : out std_logic;
+    resynchronised : out std_logic;
+    tick           : out std_logic
   );
 end entity mac_tx;
 
@@ -73,8 +88,10 @@ architecture rtl of mac_tx is
   signal jam      : std_logic;
   signal backoff  : std_logic;
 
-  signal sending  : std_logic;
+  signal on_air   : std_logic;
+  signal illegal  : std_logic; -- more than one state
   signal start    : std_logic;
+  signal expired  : std_logic; -- deferred for too long
   signal restart  : std_logic;
   signal pos      : unsigned(16 downto 0); -- nibbles of the state; backoff: slots from bit 7 on
   signal last_7   : std_logic;
@@ -97,11 +114,16 @@ architecture rtl of mac_tx is
   signal gap      : unsigned(4 downto 0); -- from 1 to 24
   signal gap_over : std_logic;
   signal slot     : std_logic;
-  signal waiting  : std_logic;
+  signal waits    : std_logic_vector(1 downto 0);
+  signal waiting  : std_logic; -- in slot
+  signal follow   : std_logic; -- only in the other one
+  signal rest     : std_logic; -- no state, nothing waits
   signal finish   : std_logic;
   signal done     : std_logic_vector(1 downto 0);
   signal result   : std_logic_vector(1 downto 0);
   signal flip     : std_logic;
+  signal repaired : std_logic;
+  signal followed : std_logic;
 
   -- One clock later, beside r_data.
   signal p_on    : std_logic;
@@ -115,10 +137,18 @@ architecture rtl of mac_tx is
   signal crc     : std_logic_vector(31 downto 0);
   signal txd     : std_logic_vector(3 downto 0);
 
+  attribute iob : string;
+
+  attribute iob of txd : signal is C_PAD;
+
 begin
 
   assert G_SEED >= 1 and G_SEED <= 131071
-    report "mac_tx: G_SEED=" & integer'image(G_SEED) & " outside 1..131071"
+    report "mac_tx: G_SEED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SEED)
+           -- synthesis translate_on
+           & " outside 1..131071"
     severity failure;
 
   pins <= f_request & full_duplex & mii_crs & mii_col;
@@ -140,15 +170,21 @@ begin
   col     <= synchronised(0) and half;
 
   -- Deference.
-  sending  <= preamble or data or fcs or jam;
+  on_air   <= preamble or data or fcs or jam;
+  illegal  <= (preamble and (data or fcs or jam or backoff)) or (data and (fcs or jam or backoff)) or
+              (fcs and (jam or backoff)) or (jam and backoff);
   gap_over <= gap(4) and gap(3);
-  waiting  <= request(0) xor done(0) when slot = '0' else request(1) xor done(1);
-  start    <= waiting and gap_over and not sending and not backoff;
+  waits    <= request xor done;
+  waiting  <= waits(0) when slot = '0' else waits(1);
+  follow   <= not on_air and not backoff and not waiting and (waits(0) or waits(1));
+  rest     <= not on_air and not backoff and not waiting;
+  start    <= waiting and gap_over and not on_air and not backoff;
+  expired  <= waiting and not gap_over and not on_air and not backoff and pos(14);
 
   p_gap : process (clk)
   begin
     if rising_edge(clk) then
-      if rst = '1' or sending = '1' or (crs = '1' and (gap(4) = '0' or gap(3) = '1')) then
+      if rst = '1' or on_air = '1' or (crs = '1' and (gap(4) = '0' or gap(3) = '1')) then
         gap <= to_unsigned(1, 5);
       elsif gap_over = '0' then
         gap <= gap + 1;
@@ -169,14 +205,18 @@ begin
   hit      <= (preamble and last_16 and (collided or col)) or ((data or fcs) and col);
   slots    <= std_logic_vector(pos(16 downto 7)) xor random(9 downto 0);
   waited   <= to_bit((slots and tried(9 downto 0)) = "0000000000");
-  finish   <= (fcs and last_7 and not col) or (jam and last_8 and (late or tried(C_TRIES - 1)));
-  restart  <= start or (preamble and last_16) or hit or all_up or (jam and last_8);
+  finish   <= (fcs and last_7 and not col) or (jam and last_8 and (late or tried(C_TRIES - 1))) or expired;
+  restart  <= start or (preamble and last_16) or hit or all_up or (jam and last_8) or (backoff and waited) or expired;
 
   -- The first nibble of the FCS leaves in the last clock of data.
   p_state : process (clk)
   begin
     if rising_edge(clk) then
       pos <= pos + 1;
+      -- The lowest ones go on: they make tick.
+      if rest = '1' then
+        pos(16 downto 3) <= (others => '0');
+      end if;
       if restart = '1' then
         pos <= (others => '0');
       end if;
@@ -205,13 +245,15 @@ begin
         random(12) <= random(11) xor nibble(3);
       end if;
 
-      if rst = '1' then
-        pos      <= (others => '0');
+      if rst = '1' or illegal = '1' then
         preamble <= '0';
         data     <= '0';
         fcs      <= '0';
         jam      <= '0';
         backoff  <= '0';
+      end if;
+      if rst = '1' then
+        pos      <= (others => '0');
         tried    <= (others => '0');
         random   <= std_logic_vector(to_unsigned(G_SEED, 17));
       end if;
@@ -219,9 +261,12 @@ begin
   end process p_state;
 
   -- Answers.
-  result     <= (jam and late) & (jam and not late);
-  f_done     <= done;
-  collisions <= flip;
+  result         <= (expired or (jam and late)) & (expired or (jam and not late));
+  f_done         <= done;
+  collisions     <= flip;
+  recovered      <= repaired;
+  resynchronised <= followed;
+  tick           <= pos(2);
 
   p_answer : process (clk)
   begin
@@ -229,20 +274,29 @@ begin
       if jam = '1' and last_8 = '1' then
         flip <= not flip;
       end if;
-      if finish = '1' then
+      if illegal = '1' then
+        repaired <= not repaired;
+      end if;
+      if follow = '1' then
+        followed <= not followed;
+      end if;
+      if finish = '1' or follow = '1' then
         slot <= not slot;
-        if slot = '0' then
-          done(0)    <= not done(0);
-          f_result_0 <= result;
-        else
-          done(1)    <= not done(1);
-          f_result_1 <= result;
-        end if;
+      end if;
+      if finish = '1' and slot = '0' then
+        done(0)    <= request(0);
+        f_result_0 <= result;
+      end if;
+      if finish = '1' and slot = '1' then
+        done(1)    <= request(1);
+        f_result_1 <= result;
       end if;
       if rst = '1' then
-        slot <= '0';
-        done <= "00";
-        flip <= '0';
+        slot     <= '0';
+        done     <= "00";
+        flip     <= '0';
+        repaired <= '0';
+        followed <= '0';
       end if;
     end if;
   end process p_answer;
@@ -253,11 +307,12 @@ begin
   index  <= "0000" when p_fcs = '1' else crc(3 downto 0) xor nibble;
 
   mii_txd <= txd;
+  sending <= p_on;
 
   p_nibble : process (clk)
   begin
     if rising_edge(clk) then
-      p_on    <= sending;
+      p_on    <= on_air;
       p_frame <= data or fcs;
       p_fcs   <= fcs or all_up;
       p_zero  <= at_end;

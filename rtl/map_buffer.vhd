@@ -8,12 +8,16 @@
 --              It must not pass a chunk that is being sent
 --   Write    : a cell per clock; empty: ready. complete after s_tlast, then not ready until release_map or clear
 --   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on: chunk f_chunk may be
---              started. A jump takes a clock more for each chunk that the start address walks over: upwards from the
---              chunk after the one sent last, then from chunk 0. f_chunk may change once f_start has been given
+--              started. From f_start the start address walks from chunk 0, a clock a chunk, so that nothing of an
+--              earlier chunk decides where it lies. f_chunk has to hold until the first byte
 --   Bytes    : ceil(G_CELL_W/8) per cell, big endian, zeros above the cell, and one idle clock after each cell. f_valid
 --              and f_data hold until f_take
 --   RAM      : ram_deep with columns of nine bits: 31 bits of 32760 cells in 28 blocks
 --   Forget   : release_map or clear, in any clock, also while cells come or bytes go; clear comes first on f_valid, too
+--   fail     : the launched tile has failed in the engine: a map that is not complete is forgotten; a chunk that is
+--              being sent goes on to its end
+--   Upsets   : the states of either side differ in two bits; any other code: as clear, and recovered for a clock. Then
+--              the map is lost, and who waits for bytes waits in vain
 --   Golden   : sw/golden/map_buffer.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -38,6 +42,8 @@ entity map_buffer is
 
     release_map : in  std_logic;
     clear       : in  std_logic;
+    fail        : in  std_logic;
+    recovered   : out std_logic;
     keep        : in  std_logic_vector(15 downto 0);
     started     : out std_logic; -- in the clock in which the first cell is taken
     busy        : out std_logic;
@@ -75,11 +81,19 @@ architecture rtl of map_buffer is
   constant C_CHUNK_W    : integer := clog2((G_CELLS + C_CHUNK - 1) / C_CHUNK + 1);
   constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
 
-  -- Write.
+  -- Read: off; the start address walks; cells leave. The codes differ in two bits.
+  constant C_OFF  : std_logic_vector(2 downto 0) := "000";
+  constant C_WALK : std_logic_vector(2 downto 0) := "011";
+  constant C_SEND : std_logic_vector(2 downto 0) := "101";
+
+  -- Write. Empty: none of busy_q, filling, complete_q; else busy_q and one of the others.
+  signal illegal    : std_logic;
   signal forget     : std_logic;
+  signal drop       : std_logic; -- the map
   signal fire       : std_logic;
   signal room       : std_logic;
   signal busy_q     : std_logic;
+  signal filling    : std_logic;
   signal complete_q : std_logic;
   signal count_q    : unsigned(C_COUNT_W - 1 downto 0);
   signal w_addr     : std_logic_vector(C_ADDR_W - 1 downto 0);
@@ -87,16 +101,15 @@ architecture rtl of map_buffer is
   signal finished   : unsigned(C_CHUNK_W - 1 downto 0); -- chunks, the short last one included
   signal kept       : unsigned(15 downto 0);            -- the largest keep of this map
 
-  -- Read. number and r_addr go together: the chunk and where it starts, but while sending: then r_addr is the cell and
-  -- number the next chunk.
+  -- Read. In walk number and r_addr go together: a chunk and where it starts. In send r_addr is the cell and number the
+  -- next chunk.
+  signal read_state : std_logic_vector(2 downto 0);
   signal exists     : std_logic;
   signal ready_q    : std_logic;
   signal number     : unsigned(C_CHUNK_W - 1 downto 0);
   signal r_addr     : unsigned(C_ADDR_W - 1 downto 0);
   signal number_ok  : std_logic;
-  signal number_end : std_logic;                        -- as many as there are
   signal r_index    : unsigned(C_INDEX_W - 1 downto 0);
-  signal sending    : std_logic;
   signal last_chunk : std_logic;
   signal last_cell  : std_logic;
   signal cell_valid : std_logic;                        -- cell_word is that of r_addr
@@ -111,33 +124,54 @@ architecture rtl of map_buffer is
 begin
 
   assert G_CELL_W >= 9 and G_CELL_W <= 48
-    report "map_buffer: G_CELL_W=" & integer'image(G_CELL_W) & " outside 9..48"
+    report "map_buffer: G_CELL_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CELL_W)
+           -- synthesis translate_on
+           & " outside 9..48"
     severity failure;
   assert G_CHUNK_CELLS >= 2 and G_CHUNK_CELLS <= 2048
-    report "map_buffer: G_CHUNK_CELLS=" & integer'image(G_CHUNK_CELLS) & " outside 2..2048"
+    report "map_buffer: G_CHUNK_CELLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_CELLS)
+           -- synthesis translate_on
+           & " outside 2..2048"
     severity failure;
   -- Numbers of chunks have 16 bits.
   assert G_CELLS >= 1 and G_CELLS < 2 ** 24 and G_CELLS / C_CHUNK < 65535
-    report "map_buffer: G_CELLS=" & integer'image(G_CELLS) & " outside 1..16777215 or over 65535 chunks"
+    report "map_buffer: G_CELLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CELLS)
+           -- synthesis translate_on
+           & " outside 1..16777215 or over 65535 chunks"
     severity failure;
   assert G_DEPTH >= G_CELLS or (G_DEPTH >= G_CHUNK_CELLS and G_DEPTH mod C_CHUNK = 0)
-    report "map_buffer: G_DEPTH=" & integer'image(G_DEPTH) & " is neither G_CELLS nor one or more chunks"
+    report "map_buffer: G_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH)
+           -- synthesis translate_on
+           & " is neither G_CELLS nor one or more chunks"
     severity failure;
 
   -- Write ------------------------------------------------------------------------------------------------------------
-  forget   <= release_map or clear;
-  s_tready <= room and not complete_q;
-  fire     <= s_tvalid and room and not complete_q;
-  started  <= fire and not busy_q;
-  busy     <= busy_q;
-  complete <= complete_q;
-  count    <= std_logic_vector(resize(count_q, 24));
+  illegal   <= (busy_q xor filling xor complete_q) or (filling and complete_q)
+               or not to_bit(read_state = C_OFF or read_state = C_WALK or read_state = C_SEND);
+  recovered <= illegal and not rst;
+  forget    <= release_map or clear or illegal;
+  drop      <= forget or (fail and filling);
+  s_tready  <= room and not complete_q;
+  fire      <= s_tvalid and room and not complete_q;
+  started   <= fire and not busy_q;
+  busy      <= busy_q;
+  complete  <= complete_q;
+  count     <= std_logic_vector(resize(count_q, 24));
 
   p_write : process (clk)
   begin
     if rising_edge(clk) then
       if fire = '1' then
         busy_q  <= '1';
+        filling <= not s_tlast;
         count_q <= count_q + 1;
         if s_tlast = '1' then
           complete_q <= '1';
@@ -150,8 +184,9 @@ begin
           finished <= finished + 1;
         end if;
       end if;
-      if rst = '1' or forget = '1' then
+      if rst = '1' or drop = '1' then
         busy_q     <= '0';
+        filling    <= '0';
         complete_q <= '0';
         count_q    <= (others => '0');
         w_index    <= (others => '0');
@@ -164,7 +199,7 @@ begin
     room   <= '1';
     kept   <= (others => '0');
     w_addr <= std_logic_vector(count_q(C_ADDR_W - 1 downto 0));
-    exists <= not number_end;
+    exists <= to_bit(unsigned(f_chunk) < finished);
   end generate g_whole;
 
   g_ring : if not C_WHOLE generate
@@ -174,7 +209,7 @@ begin
     used   <= ('0' & finished) - ('0' & kept);
     room   <= used(16) or to_bit(used(15 downto 0) < C_RING);
     w_addr <= std_logic_vector(addr);
-    exists <= not number_end and to_bit(number >= kept);
+    exists <= to_bit(unsigned(f_chunk) < finished) and to_bit(unsigned(f_chunk) >= kept);
 
     p_ring : process (clk)
     begin
@@ -188,7 +223,7 @@ begin
         if unsigned(keep) > kept and busy_q = '1' then
           kept <= unsigned(keep);
         end if;
-        if rst = '1' or forget = '1' then
+        if rst = '1' or drop = '1' then
           addr <= (others => '0');
           kept <= (others => '0');
         end if;
@@ -209,9 +244,8 @@ begin
     );
 
   -- Read -------------------------------------------------------------------------------------------------------------
-  number_ok  <= to_bit(unsigned(f_chunk) = number);
-  number_end <= to_bit(number = finished);
-  last_chunk <= complete_q and number_end;
+  number_ok  <= to_bit(unsigned(f_chunk(C_CHUNK_W - 1 downto 0)) = number); -- it exists, so its number is no longer
+  last_chunk <= complete_q and to_bit(number = finished);
   last_cell  <= to_bit(r_index = G_CHUNK_CELLS - 1) or (last_chunk and to_bit(r_index = w_index));
   last_byte  <= to_bit(byte_n = C_CELL_BYTES - 1);
   load       <= cell_valid and (f_take or not valid_q);
@@ -232,8 +266,8 @@ begin
   p_read : process (clk)
   begin
     if rising_edge(clk) then
-      ready_q    <= exists and number_ok and not sending and not f_start;
-      cell_valid <= sending;
+      ready_q    <= exists and to_bit(read_state = C_OFF) and not f_start;
+      cell_valid <= to_bit(read_state = C_SEND);
 
       if load = '1' and last_byte = '1' then
         cell_valid <= '0';
@@ -243,26 +277,19 @@ begin
           r_addr <= (others => '0');
         end if;
         if last_cell = '1' then
-          sending <= '0';
+          read_state <= C_OFF;
         end if;
       end if;
 
-      if f_start = '1' then
-        sending    <= '1';
-        cell_valid <= '1';
-        r_index    <= (others => '0');
-        number     <= number + 1;
-      elsif sending = '0' then
-        if number_ok = '0' and number_end = '1' then
-          number <= (others => '0');
+      if read_state = C_WALK then
+        number <= number + 1;
+        if number_ok = '1' then
+          read_state <= C_SEND;
+          cell_valid <= '1';
+        elsif not C_WHOLE and r_addr = C_TURN then
           r_addr <= (others => '0');
-        elsif number_ok = '0' then
-          number <= number + 1;
-          if not C_WHOLE and r_addr = C_TURN then
-            r_addr <= (others => '0');
-          else
-            r_addr <= r_addr + G_CHUNK_CELLS;
-          end if;
+        else
+          r_addr <= r_addr + G_CHUNK_CELLS;
         end if;
       end if;
 
@@ -278,13 +305,19 @@ begin
         valid_q <= '0';
       end if;
 
-      if rst = '1' or forget = '1' then
-        ready_q    <= '0';
-        sending    <= '0';
-        cell_valid <= '0';
+      if f_start = '1' then
+        read_state <= C_WALK;
         number     <= (others => '0');
         r_addr     <= (others => '0');
+        r_index    <= (others => '0');
         byte_n     <= (others => '0');
+        valid_q    <= '0';
+      end if;
+
+      if rst = '1' or forget = '1' then
+        ready_q    <= '0';
+        read_state <= C_OFF;
+        cell_valid <= '0';
         valid_q    <= '0';
       end if;
     end if;

@@ -1,23 +1,35 @@
 -- SPDX-License-Identifier: Apache-2.0
--- packet_rx: frames of the MAC -> messages for the responder: ARP requests, ICMP echo requests, UDP to one port.
+-- packet_rx: frames of the MAC -> messages for the responder: ARP requests, ICMP echo requests, UDP to one port, and
+--            UDP to any other port (closed), which is told to its sender.
 --   Input     : bytes behind the SFD, FCS included; then one beat with s_last whose s_data is the MAC's verdict
 --               (mac_rx; 0 = good: at least 64, at most 1518 bytes, FCS right). s_ready is low in the one clock behind
 --               a verdict
---   Accepts   : destination own_mac or broadcast. ARP (RFC 826): Ethernet, IPv4, request, target own_ip. IPv4 (RFC
---               791): header of 5 words, total length at least 28 and within the frame, header checksum, not a
---               fragment, destination own_ip; with ICMP (RFC 792): type 8, code 0, checksum over the message; or with
---               UDP (RFC 768): port G_UDP_PORT, length = total length - 20, checksum (0: none). What lies behind the
---               IP packet (padding, FCS) is not looked at
---   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP), m_length (ICMP: bytes from frame byte 34 on, UDP: payload,
---               from byte 42 on; ARP: 0) of the oldest message, until m_done; its frame through r_addr, r_data (1
---               clock)
+--   Accepts   : destination own_mac; broadcast for ARP only. ARP (RFC 826): Ethernet, IPv4, request, target own_ip.
+--               IPv4 (RFC 791): header of 5 words, total length at least 28 and within the frame, header checksum, not
+--               a fragment, destination own_ip; with ICMP (RFC 792): type 8, code 0, checksum over the message; or with
+--               UDP (RFC 768): length = total length - 20, checksum (0: none). What lies behind the IP packet (padding,
+--               FCS) is not looked at
+--   Sources   : refused are, as RFC 1122 (3.2.1.3) has it: source MAC with the group bit, or own_mac; source IP of 0/8,
+--               127/8, 224/4 and 240/4, or own_ip; ARP: sender's MAC with the group bit, or own_mac, sender's IP own_ip
+--               (0.0.0.0 is a probe, RFC 5227, and answered)
+--   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP, 3 UDP to another port than G_UDP_PORT), m_length (ICMP: bytes
+--               from frame byte 34 on, UDP: payload, from byte 42 on; ARP: 0) of the oldest message, until m_done; its
+--               frame through r_addr, r_data (1 clock)
 --   Ring      : G_SLOTS * 2 KB in granules of 512 bytes. A frame takes 1 to 3 of them, as many as it needs, FCS
 --               included. Bytes are stored as they come, and a frame becomes a message at its verdict only. Each of its
 --               granules must be free at its first byte; else the frame is lost. What waits is never touched, whatever
 --               the input
---   Events    : bit n = counter n of docs/protocol.md, one pulse a frame two clocks behind its verdict, a message two
---               (0 and its kind). Order: the MAC's verdict (8, 5, 4, 3, 2, 1), 6 destination MAC, 9 ethertype or ARP,
---               10 IP header, 11 fragment, 9 protocol, port or ICMP type, 12 UDP length or checksum, 7 no slot
+--   Events    : bits 0 to 15: counter of that number in docs/protocol.md; 16 bad_source, 17 rx_fragment, 18
+--               resynchronised (not of a frame). One pulse a frame two clocks behind its verdict, a message two (0 and
+--               its kind; kind 3: 0 and 9). Order: the MAC's verdict (8, 5, 4, 3 or, in half duplex with a wrong FCS,
+--               17, 2, 1), 6 destination MAC, 9 ethertype or ARP, 10 IP header, 16 source, 11 fragment, 9 protocol or
+--               ICMP type, 12 UDP length or checksum, 7 no slot
+--   Upsets    : a message says how many granules it has (1 to 3) and in which lap it was written. One of no granules or
+--               of another lap than the reader's was there before a pointer was upset, and more granules in use than
+--               there are mean the same: then the ring begins anew, empty, without the frame that is just coming in
+--               (resynchronised). So whatever is upset, the reader
+--               moves towards the writer with each message, shows at most as many wrong ones as there are granules, and
+--               with an empty ring all is right again
 --   Latency   : m_valid 3 clocks behind the verdict
 --   Structure : one position counter. It starts at -34, so that it counts the bytes behind the IP header without a
 --               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and
@@ -30,7 +42,7 @@
 --               The ring is addressed with the position, too: granule of the frame + its upper two bits, mod
 --               granules. So the first 34 bytes (position -34 .. -1) are the last 34 of the granule before, which no
 --               frame uses for its own end: the next one is taken at frame byte 512, position 478. Pointers are granule
---               numbers with one bit more; kind, length and next granule of a message are kept under its granule
+--               numbers with one bit more, the lap; kind, length and granules of a message are kept under its first one
 --   Reset     : no message, next byte is the first of a frame; RAM and data registers have no reset
 --   Golden    : sw/golden/packet_rx.hpp
 library ieee;
@@ -52,8 +64,9 @@ entity packet_rx is
     s_last  : in  std_logic;
     s_data  : in  std_logic_vector(7 downto 0);
 
-    own_mac : in  std_logic_vector(47 downto 0); -- first byte on the wire on the left; static
-    own_ip  : in  std_logic_vector(31 downto 0);
+    own_mac     : in  std_logic_vector(47 downto 0); -- first byte on the wire on the left; static
+    own_ip      : in  std_logic_vector(31 downto 0);
+    half_duplex : in  std_logic;
 
     m_valid  : out std_logic;
     m_kind   : out std_logic_vector(1 downto 0);
@@ -62,13 +75,14 @@ entity packet_rx is
     r_addr   : in  std_logic_vector(10 downto 0);
     r_data   : out std_logic_vector(7 downto 0);
 
-    events : out std_logic_vector(15 downto 0)
+    events : out std_logic_vector(18 downto 0)
   );
 end entity packet_rx;
 
 architecture rtl of packet_rx is
 
   constant C_RING_W : integer := clog2(4 * G_SLOTS); -- bits of a granule number
+  constant C_RING_END : unsigned(C_RING_W - 2 downto 0) := (others => '1');
   constant C_HEADER : integer := 34; -- bytes up to the end of the IP header: position 0 is frame byte 34
   constant C_FIRST  : unsigned(10 downto 0) := to_unsigned(2048 - C_HEADER, 11);
   constant C_PORT   : unsigned(15 downto 0) := to_unsigned(G_UDP_PORT mod 65536, 16);
@@ -82,6 +96,11 @@ architecture rtl of packet_rx is
   signal arp    : std_logic;             -- from frame byte 13 on
   signal icmp   : std_logic;             -- from frame byte 23 on
   signal udp    : std_logic;
+  signal sender : std_logic;             -- frame byte 6 .. 11, or 22 .. 27
+  signal in_mac : std_logic;             -- destination, source; ARP: sender
+  signal in_ip  : std_logic;             -- source, destination; ARP: sender, target
+  signal mac_at : unsigned(2 downto 0);  -- byte of a MAC address + 6 (mod 8)
+  signal ip_at  : unsigned(1 downto 0);
 
   -- The byte that is expected there.
   signal mac_byte    : std_logic_vector(7 downto 0);
@@ -92,6 +111,7 @@ architecture rtl of packet_rx is
 
   -- One clock later: the data, what it should be, and to what class it belongs.
   signal got          : std_logic;
+  signal near_q       : std_logic; -- the flags below mean this byte
   signal verdict      : std_logic; -- data is the verdict
   signal data         : std_logic_vector(7 downto 0);
   signal want         : std_logic_vector(7 downto 0);
@@ -99,13 +119,19 @@ architecture rtl of packet_rx is
   signal of_type      : std_logic; -- ethertype, ARP
   signal of_head      : std_logic;
   signal of_fragment  : std_logic;
-  signal of_port      : std_logic; -- protocol, port, ICMP type
+  signal of_kind      : std_logic; -- protocol, ICMP type
+  signal of_port      : std_logic;
   signal of_length    : std_logic;
   signal of_checksum  : std_logic;
   signal only_low     : std_logic; -- bits 7..6 do not matter (fragment flags)
   signal only_high    : std_logic; -- bits 2..0 do not matter (total length)
   signal takes_length : std_logic;
+  signal of_group     : std_logic; -- first byte of a MAC address that may not be a group's
+  signal of_net       : std_logic; -- first byte of the source IP
+  signal of_first     : std_logic; -- of an address of the sender
+  signal of_last      : std_logic;
   signal differs      : std_logic;
+  signal bad_net      : std_logic;
 
   -- What was wrong so far.
   signal not_mine     : std_logic;
@@ -113,7 +139,10 @@ architecture rtl of packet_rx is
   signal bad_type     : std_logic;
   signal bad_head     : std_logic;
   signal bad_fragment : std_logic;
-  signal bad_port     : std_logic;
+  signal bad_kind     : std_logic;
+  signal closed       : std_logic; -- another port
+  signal own_so_far   : std_logic; -- the address of the sender is our own
+  signal bad_source   : std_logic;
   signal bad_length   : std_logic;
   signal has_checksum : std_logic;
 
@@ -139,17 +168,21 @@ architecture rtl of packet_rx is
   -- Judgement.
   signal ip_bad  : std_logic;
   signal sum_bad : std_logic;
-  signal outcome : std_logic_vector(15 downto 0);
+  signal outcome : std_logic_vector(17 downto 0);
   signal commit  : std_logic;
 
   -- Ring: granule numbers with one bit more.
   signal store      : std_logic;                        -- a byte of a frame
   signal crossing   : std_logic;                        -- it is the first of a granule
   signal write_head : unsigned(C_RING_W downto 0);      -- of the frame that comes in
-  signal write_tail : unsigned(C_RING_W downto 0);      -- the granule behind what it has so far
   signal read_head  : unsigned(C_RING_W downto 0);      -- of the oldest message
-  signal full       : std_logic;
-  signal empty      : std_logic;
+  signal used       : unsigned(C_RING_W downto 0);      -- by messages
+  signal taken      : unsigned(1 downto 0);             -- by the frame so far
+  signal taken_now  : unsigned(1 downto 0);             -- the same, none before its first one
+  signal full       : std_logic;                        -- all in use, by the frame, too
+  signal broken     : std_logic;                        -- more used than there are
+  signal shown      : std_logic;
+  signal stale      : std_logic;                        -- what is shown is no message
   signal room       : std_logic;                        -- all bytes of the frame so far had room
   signal room_now   : std_logic;
 
@@ -164,8 +197,8 @@ architecture rtl of packet_rx is
 
   signal info_waddr   : std_logic_vector(C_RING_W - 1 downto 0);
   signal info_raddr   : std_logic_vector(C_RING_W - 1 downto 0);
-  signal info_write   : std_logic_vector(C_RING_W + 13 downto 0);
-  signal info_read    : std_logic_vector(C_RING_W + 13 downto 0);
+  signal info_write   : std_logic_vector(15 downto 0);
+  signal info_read    : std_logic_vector(15 downto 0);
   signal reply_length : unsigned(10 downto 0);
 
   -- Frame byte n, as place.
@@ -177,10 +210,18 @@ architecture rtl of packet_rx is
 begin
 
   assert G_SLOTS = 2 or G_SLOTS = 4
-    report "packet_rx: G_SLOTS=" & integer'image(G_SLOTS) & " is neither 2 nor 4"
+    report "packet_rx: G_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SLOTS)
+           -- synthesis translate_on
+           & " is neither 2 nor 4"
     severity failure;
   assert G_UDP_PORT >= 1 and G_UDP_PORT <= 65535
-    report "packet_rx: G_UDP_PORT=" & integer'image(G_UDP_PORT) & " outside 1..65535"
+    report "packet_rx: G_UDP_PORT"
+           -- synthesis translate_off
+           & "=" & integer'image(G_UDP_PORT)
+           -- synthesis translate_on
+           & " outside 1..65535"
     severity failure;
 
   -- Position ----------------------------------------------------------------------------------------------------------
@@ -206,6 +247,9 @@ begin
           icmp <= not s_data(4) and not arp;
         end if;
       end if;
+      if rst = '1' or verdict = '1' then
+        arp <= '0';
+      end if;
       if rst = '1' or (fire = '1' and s_last = '1') then
         pos  <= C_FIRST;
         near <= '1';
@@ -213,32 +257,42 @@ begin
     end if;
   end process p_position;
 
+  -- Places of addresses: MAC 30 to 35 and 36 to 41, ARP 52 to 57; IP 56 to 63, ARP 58 to 61 and 4 to 7.
+  sender <= place(5) and (place(4) or place(3) or place(2));
+  in_mac <= to_bit(place(5 downto 1) = 15 or place(5 downto 2) = 8 or place(5 downto 2) = 9 or
+                   place(5 downto 1) = 20) or
+            (arp and to_bit(place(5 downto 2) = 13 or place(5 downto 1) = 28));
+  in_ip  <= to_bit(place(5 downto 1) = 29 or place(5 downto 1) = 30) or
+            (not arp and to_bit(place(5 downto 3) = 7)) or (arp and to_bit(place(5 downto 2) = 1));
+  mac_at <= (place(2 downto 1) + unsigned'('0' & sender)) & place(0);
+  ip_at  <= (place(1) xor (arp and place(5))) & place(0);
+
   -- Expected bytes ----------------------------------------------------------------------------------------------------
-  p_mac_byte : process (own_mac, place)
+  p_mac_byte : process (own_mac, mac_at)
   begin
-    if place(2 downto 0) = "110" then
+    if mac_at = "110" then
       mac_byte <= own_mac(47 downto 40);
-    elsif place(2 downto 0) = "111" then
+    elsif mac_at = "111" then
       mac_byte <= own_mac(39 downto 32);
-    elsif place(1 downto 0) = "00" then
+    elsif mac_at(1 downto 0) = "00" then
       mac_byte <= own_mac(31 downto 24);
-    elsif place(1 downto 0) = "01" then
+    elsif mac_at(1 downto 0) = "01" then
       mac_byte <= own_mac(23 downto 16);
-    elsif place(1 downto 0) = "10" then
+    elsif mac_at(1 downto 0) = "10" then
       mac_byte <= own_mac(15 downto 8);
     else
       mac_byte <= own_mac(7 downto 0);
     end if;
   end process p_mac_byte;
 
-  -- Target of ARP and destination of IP both begin at a multiple of 4.
-  p_ip_byte : process (own_ip, place)
+  -- All but the sender of ARP begin at a multiple of 4.
+  p_ip_byte : process (own_ip, ip_at)
   begin
-    if place(1 downto 0) = "00" then
+    if ip_at = "00" then
       ip_byte <= own_ip(31 downto 24);
-    elsif place(1 downto 0) = "01" then
+    elsif ip_at = "01" then
       ip_byte <= own_ip(23 downto 16);
-    elsif place(1 downto 0) = "10" then
+    elsif ip_at = "10" then
       ip_byte <= own_ip(15 downto 8);
     else
       ip_byte <= own_ip(7 downto 0);
@@ -279,12 +333,12 @@ begin
     end if;
   end process p_fixed_byte;
 
-  p_want : process (place, arp, udp, mac_byte, ip_byte, length_byte, fixed_byte)
+  p_want : process (place, in_mac, in_ip, mac_byte, ip_byte, length_byte, fixed_byte)
   begin
-    if place(5 downto 3) = "011" or place(5 downto 2) = "1000" then
-      want_next <= mac_byte;                           -- frame bytes 0 to 5
-    elsif place(5 downto 2) = "1111" or (place(5 downto 2) = "0001" and arp = '1') then
-      want_next <= ip_byte;                            -- 30 to 33, or 38 to 41 of ARP
+    if in_mac = '1' then
+      want_next <= mac_byte;
+    elsif in_ip = '1' then
+      want_next <= ip_byte;
     elsif place(5 downto 1) = "00010" then
       want_next <= length_byte;                        -- 38, 39 of UDP
     else
@@ -300,19 +354,26 @@ begin
       data    <= s_data;
       want    <= want_next;
 
-      of_mac       <= near and to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
-      of_type      <= near and (at_byte(place, 12) or at_byte(place, 13) or
+      near_q       <= near;
+      of_mac       <= to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
+      of_type      <= at_byte(place, 12) or at_byte(place, 13) or
                       (arp and (to_bit(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
-                                to_bit(place(5 downto 2) = "0001"))));
-      of_head      <= near and (at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111"));
-      of_fragment  <= near and (at_byte(place, 20) or at_byte(place, 21));
-      of_port      <= near and (at_byte(place, 23) or
-                      (icmp and to_bit(place(5 downto 1) = "00000")) or (udp and to_bit(place(5 downto 1) = "00001")));
-      of_length    <= near and udp and to_bit(place(5 downto 1) = "00010");
-      of_checksum  <= near and udp and to_bit(place(5 downto 1) = "00011");
+                                to_bit(place(5 downto 2) = "0001")));
+      of_head      <= at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111");
+      of_fragment  <= at_byte(place, 20) or at_byte(place, 21);
+      of_kind      <= at_byte(place, 23) or (icmp and to_bit(place(5 downto 1) = "00000"));
+      of_port      <= udp and to_bit(place(5 downto 1) = "00001");
+      of_length    <= udp and to_bit(place(5 downto 1) = "00010");
+      of_checksum  <= udp and to_bit(place(5 downto 1) = "00011");
       only_low     <= at_byte(place, 20) and not arp;
       only_high    <= at_byte(place, 16) and not arp;
       takes_length <= near and at_byte(place, 17);
+      of_group     <= at_byte(place, 6) or (arp and at_byte(place, 22));
+      of_net       <= at_byte(place, 26) and not arp;
+      of_first     <= at_byte(place, 6) or (arp and (at_byte(place, 22) or at_byte(place, 28))) or
+                      (at_byte(place, 26) and not arp);
+      of_last      <= at_byte(place, 11) or (arp and (at_byte(place, 27) or at_byte(place, 31))) or
+                      (at_byte(place, 29) and not arp);
 
       add_head   <= header and to_bit(place >= 44);
       add_body   <= not near or to_bit(place = 46 or place = 47 or place >= 56 or place < 8);
@@ -327,16 +388,22 @@ begin
   differs <= to_bit((data(7 downto 6) /= want(7 downto 6) and only_low = '0') or data(5 downto 3) /= want(5 downto 3) or
                     (data(2 downto 0) /= want(2 downto 0) and only_high = '0'));
 
+  bad_net <= to_bit(data(7 downto 5) = "111" or data = x"00" or data = x"7f");
+
   p_wrong : process (clk)
   begin
     if rising_edge(clk) then
-      if got = '1' then
+      if got = '1' and near_q = '1' then
         not_mine     <= not_mine or (of_mac and differs);
         not_all      <= not_all or (of_mac and to_bit(data /= x"ff"));
         bad_type     <= bad_type or (of_type and differs);
         bad_head     <= bad_head or (of_head and differs);
         bad_fragment <= bad_fragment or (of_fragment and differs);
-        bad_port     <= bad_port or (of_port and differs);
+        bad_kind     <= bad_kind or (of_kind and differs);
+        closed       <= closed or (of_port and differs);
+        own_so_far   <= (own_so_far or of_first) and not differs;
+        bad_source   <= bad_source or (of_group and data(0)) or (of_net and bad_net) or
+                        (of_last and own_so_far and not differs);
         bad_length   <= bad_length or (of_length and differs);
         has_checksum <= has_checksum or (of_checksum and differs);
       end if;
@@ -346,7 +413,9 @@ begin
         bad_type     <= '0';
         bad_head     <= '0';
         bad_fragment <= '0';
-        bad_port     <= '0';
+        bad_kind     <= '0';
+        closed       <= '0';
+        bad_source   <= '0';
         bad_length   <= '0';
         has_checksum <= '0';
       end if;
@@ -415,7 +484,8 @@ begin
              (not arp and (bad_head or to_bit(head_sum /= x"ffff")));
   sum_bad <= bad_length or (to_bit(body_sum /= x"ffff") and (icmp or has_checksum));
 
-  p_outcome : process (data, not_mine, not_all, bad_type, ip_bad, arp, icmp, bad_fragment, bad_port, sum_bad, room)
+  p_outcome : process (data, half_duplex, not_mine, not_all, bad_type, ip_bad, bad_source, arp, icmp, bad_fragment,
+                       bad_kind, sum_bad, closed, room)
   begin
     outcome <= (others => '0');
     if data(5) = '1' then
@@ -425,20 +495,23 @@ begin
     elsif data(3) = '1' then
       outcome(4) <= '1';
     elsif data(2) = '1' then
-      outcome(3) <= '1';
+      outcome(3)  <= not half_duplex or not data(0);
+      outcome(17) <= half_duplex and data(0);
     elsif data(1) = '1' then
       outcome(2) <= '1';
     elsif data(0) = '1' then
       outcome(1) <= '1';
-    elsif not_mine = '1' and not_all = '1' then
+    elsif not_mine = '1' and (not_all = '1' or arp = '0') then
       outcome(6) <= '1';
     elsif bad_type = '1' then
       outcome(9) <= '1';
     elsif ip_bad = '1' then
       outcome(10) <= '1';
+    elsif bad_source = '1' then
+      outcome(16) <= '1';
     elsif bad_fragment = '1' and arp = '0' then
       outcome(11) <= '1';
-    elsif bad_port = '1' and arp = '0' then
+    elsif bad_kind = '1' and arp = '0' then
       outcome(9) <= '1';
     elsif sum_bad = '1' and arp = '0' then
       outcome(12) <= '1';
@@ -446,9 +519,10 @@ begin
       outcome(7) <= '1';
     else
       outcome(0)  <= '1';
+      outcome(9)  <= closed;
       outcome(13) <= arp;
       outcome(14) <= icmp;
-      outcome(15) <= not arp and not icmp;
+      outcome(15) <= udp and not closed;
     end if;
   end process p_outcome;
 
@@ -457,9 +531,13 @@ begin
   p_events : process (clk)
   begin
     if rising_edge(clk) then
-      events <= outcome;
+      events(17 downto 0) <= outcome;
       if verdict = '0' then
-        events <= (others => '0');
+        events(17 downto 0) <= (others => '0');
+      end if;
+      events(18) <= broken or stale;
+      if rst = '1' then
+        events(18) <= '0';
       end if;
     end if;
   end process p_events;
@@ -467,37 +545,41 @@ begin
   -- Ring --------------------------------------------------------------------------------------------------------------
   store    <= fire and not s_last;
   crossing <= store and to_bit(pos(8 downto 0) = C_FIRST(8 downto 0));
-  empty    <= to_bit(write_head = read_head);
-  full     <= to_bit(write_tail(C_RING_W - 1 downto 0) = read_head(C_RING_W - 1 downto 0)) and
-              (write_tail(C_RING_W) xor read_head(C_RING_W));
+  used     <= write_head - read_head;
+  broken   <= used(C_RING_W) and to_bit(used(C_RING_W - 1 downto 0) /= 0);
   room_now <= not full and (near or room) when crossing = '1' else -- near: the first granule
               room;
+
+  taken_now <= "00" when near = '1' else taken;
+  full      <= used(C_RING_W) or (to_bit(used(C_RING_W - 1 downto 1) = C_RING_END) and
+                                  (taken_now(1) or (taken_now(0) and used(0))));
 
   p_ring : process (clk)
   begin
     if rising_edge(clk) then
       room <= room_now;
       if crossing = '1' then
-        write_tail <= write_tail + 1;
-      end if;
-      if verdict = '1' and outcome(0) = '0' then
-        write_tail <= write_head;
+        taken <= taken_now + 1;
       end if;
       if commit = '1' then
-        write_head <= write_tail;
+        write_head <= write_head + taken;
       end if;
       if m_done = '1' then
-        read_head <= unsigned(info_read(C_RING_W + 13 downto 13));
+        read_head <= read_head + unsigned(info_read(14 downto 13));
       end if;
-      m_valid <= not empty and not m_done; -- info_read follows read_head by one clock
-      if rst = '1' then
+      -- info_read follows read_head by one clock.
+      shown <= to_bit(used /= 0) and not m_done;
+      if rst = '1' or broken = '1' or stale = '1' then
+        room       <= '0';
         write_head <= (others => '0');
-        write_tail <= (others => '0');
         read_head  <= (others => '0');
-        m_valid    <= '0';
+        shown      <= '0';
       end if;
     end if;
   end process p_ring;
+
+  stale   <= shown and ((info_read(15) xor read_head(C_RING_W)) or not (info_read(14) or info_read(13)));
+  m_valid <= shown and not stale;
 
   -- A frame that is longer than 1569 bytes would come to the granule before its own once more.
   frame_we <= store and room_now and (near or not header);
@@ -534,11 +616,12 @@ begin
 
   info_waddr <= std_logic_vector(write_head(C_RING_W - 1 downto 0));
   info_raddr <= std_logic_vector(read_head(C_RING_W - 1 downto 0));
-  info_write <= std_logic_vector(write_tail) & (not arp and not icmp) & icmp & std_logic_vector(reply_length);
+  info_write <= write_head(C_RING_W) & std_logic_vector(taken) & udp & (icmp or (udp and closed)) &
+                std_logic_vector(reply_length);
 
   u_info : entity work.ram_sdp
     generic map (
-      G_DATA_W  => C_RING_W + 14,
+      G_DATA_W  => 16,
       G_DEPTH   => 4 * G_SLOTS,
       G_LATENCY => 1
     )

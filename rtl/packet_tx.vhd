@@ -1,12 +1,18 @@
 -- SPDX-License-Identifier: Apache-2.0
--- packet_tx: ARP reply (RFC 826), ICMP echo reply (RFC 792) or UDP packet (RFC 768) in a frame slot of mac_tx.
---   Input     : s_start (pulse, only while s_ready) with s_kind 0 ARP, 1 ICMP, 2 UDP, and the peer's bank; then the
---               payload, 1 .. 1472 bytes with p_last (ICMP: from frame byte 38 on, UDP: from 42 on; ARP: none), with
---               any gaps. The peer's bytes (0-5 MAC, 6-9 IP, 10-11 UDP port) stand still from s_start until s_ready
+-- packet_tx: ARP reply (RFC 826), ICMP echo reply or port unreachable (RFC 792) or UDP packet (RFC 768) in a frame
+--            slot of mac_tx.
+--   Input     : s_start (pulse, only while s_ready) with s_kind 0 ARP, 1 ICMP echo, 2 UDP, 3 ICMP port unreachable, and
+--               the peer's bank; then the payload, 1 .. 1472 bytes with p_last (ICMP: from frame byte 38 on, UDP: from
+--               42 on; ARP: none), with any gaps. The peer's bytes (0-5 MAC, 6-9 IP, 10-11 UDP port) stand still from
+--               s_start until s_ready
+--   Abort     : s_abort: the frame being built is forgotten; what is requested stays. s_ready as usual, from the next clock on
 --   Output    : the frame without padding and FCS, at slot & byte of ram_dc; then f_request of the slot flips. Slots
 --               take turns. IPv4 (RFC 791): id 0, do not fragment, TTL 64. UDP from port G_UDP_PORT, checksum 0 sent
 --               as 0xffff
---   Events    : ev_sent, ev_excessive, ev_late: one pulse when f_done of a slot comes back
+--   Events    : ev_sent, ev_excessive, ev_late, ev_deferred: one pulse when f_done of a slot comes back
+--   Upsets    : more than one of the steps of building at a time: the frame is forgotten, pulse of ev_recovered.
+--               f_request(s) becomes what f_done(s) is not, so that no upset of either outlasts a frame; which slot is
+--               next is this entity's choice, and mac_tx follows
 --   Time      : a clock for each byte of the payload, then 170 clocks (ICMP: 154)
 --   Structure : the payload goes first, so that all lengths are known when the header is written. The header is walked
 --               through four times: written and summed for UDP; UDP or ICMP checksum written; summed for IP; IP
@@ -16,8 +22,9 @@
 --               Sum: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits for
 --               the next byte. UDP sums bytes 14-23, 26-39 and, in place of the IP checksum, a constant that turns the
 --               former into the pseudo header
---   Crossing  : f_done through cdc_sync; f_result stands still beside it
---   Reset     : both slots free, mac_tx must be reset, too; data registers have no reset
+--   Crossing  : f_done and tx_rst through cdc_sync; f_result stands still beside f_done
+--   Reset     : both slots free; data registers have no reset. While tx_rst, of mac_tx, is seen, as long as there is no
+--               tx_clk, no slot is free, none is requested, and f_done means nothing
 --   Golden    : sw/golden/packet_tx.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -39,6 +46,7 @@ entity packet_tx is
     s_start : in  std_logic;
     s_kind  : in  std_logic_vector(1 downto 0);
     s_bank  : in  std_logic;
+    s_abort : in  std_logic;
 
     p_valid : in  std_logic;
     p_ready : out std_logic;
@@ -54,6 +62,7 @@ entity packet_tx is
     ram_waddr : out std_logic_vector(11 downto 0);
     ram_wdata : out std_logic_vector(7 downto 0);
 
+    tx_rst     : in  std_logic; -- of tx_clk
     f_request  : out std_logic_vector(1 downto 0);
     f_length_0 : out std_logic_vector(10 downto 0);
     f_length_1 : out std_logic_vector(10 downto 0);
@@ -63,7 +72,9 @@ entity packet_tx is
 
     ev_sent      : out std_logic;
     ev_excessive : out std_logic;
-    ev_late      : out std_logic
+    ev_late      : out std_logic;
+    ev_deferred  : out std_logic;
+    ev_recovered : out std_logic
   );
 end entity packet_tx;
 
@@ -75,14 +86,16 @@ architecture rtl of packet_tx is
 
   -- What is being done, one after the other: nothing; payload; one clock; header.
   signal busy    : std_logic;
+  signal illegal : std_logic; -- more than one of them
   signal paying  : std_logic;
   signal turning : std_logic;
   signal walking : std_logic;
   signal finish  : std_logic;
 
+  signal kind : std_logic_vector(1 downto 0);
   signal arp  : std_logic;
   signal udp  : std_logic;
-  signal icmp : std_logic;
+  signal icmp : std_logic; -- both kinds
   signal bank : std_logic;
   signal slot : std_logic;
   signal size : unsigned(10 downto 0); -- of the frame so far
@@ -124,6 +137,9 @@ architecture rtl of packet_tx is
   signal carry  : std_logic;
 
   -- Slots.
+  signal levels    : std_logic_vector(2 downto 0);
+  signal levels_q  : std_logic_vector(2 downto 0);
+  signal down      : std_logic; -- mac_tx is in reset
   signal request   : std_logic_vector(1 downto 0);
   signal done      : std_logic_vector(1 downto 0);
   signal done_seen : std_logic_vector(1 downto 0);
@@ -133,11 +149,19 @@ architecture rtl of packet_tx is
 begin
 
   assert G_UDP_PORT >= 1 and G_UDP_PORT <= 65535
-    report "packet_tx: G_UDP_PORT=" & integer'image(G_UDP_PORT) & " outside 1..65535"
+    report "packet_tx: G_UDP_PORT"
+           -- synthesis translate_off
+           & "=" & integer'image(G_UDP_PORT)
+           -- synthesis translate_on
+           & " outside 1..65535"
     severity failure;
 
   -- Control -----------------------------------------------------------------------------------------------------------
-  icmp    <= not arp and not udp;
+  busy    <= paying or turning or walking;
+  illegal <= (paying and (turning or walking)) or (turning and walking);
+  arp     <= not kind(1) and not kind(0);
+  udp     <= kind(1) and not kind(0);
+  icmp    <= kind(0);
   take    <= paying and p_valid;
   p_ready <= paying;
   last    <= to_bit(place = 41) or (icmp and to_bit(place = 37)); -- the ICMP payload begins at 38
@@ -148,13 +172,11 @@ begin
     if rising_edge(clk) then
       turning <= (s_start and to_bit(s_kind = "00")) or (take and p_last);
       if s_start = '1' then
-        busy   <= '1';
         paying <= to_bit(s_kind /= "00");
-        arp    <= to_bit(s_kind = "00");
-        udp    <= s_kind(1);
+        kind   <= s_kind;
         bank   <= s_bank;
         size   <= to_unsigned(42, 11);
-        if s_kind = "01" then
+        if s_kind(0) = '1' then
           size <= to_unsigned(38, 11);
         end if;
       elsif take = '1' then
@@ -173,18 +195,18 @@ begin
         end if;
         -- The latest byte was written long ago.
         if finish = '1' then
-          busy    <= '0';
           walking <= '0';
         end if;
+      else
+        place <= (others => '0');
+        round <= (others => '0');
       end if;
 
-      if rst = '1' then
-        busy    <= '0';
+      ev_recovered <= illegal and not rst;
+      if rst = '1' or s_abort = '1' or illegal = '1' then
         paying  <= '0';
         turning <= '0';
         walking <= '0';
-        place   <= (others => '0');
-        round   <= (others => '0');
       end if;
     end if;
   end process p_control;
@@ -230,8 +252,8 @@ begin
     end if;
   end process p_ip_byte;
 
-  -- Zero where nothing else is said.
-  p_fixed_byte : process (place, arp, udp)
+  -- Zero where nothing else is said. Type 3, code 3: port unreachable.
+  p_fixed_byte : process (place, kind, arp, udp)
   begin
     fixed_byte <= (others => '0');
     if place = 12 then
@@ -265,10 +287,14 @@ begin
     elsif place = 34 then
       if udp = '1' then
         fixed_byte <= std_logic_vector(C_PORT(15 downto 8));
+      elsif kind = "11" then
+        fixed_byte <= x"03";
       end if;
     elsif place = 35 then
       if udp = '1' then
         fixed_byte <= std_logic_vector(C_PORT(7 downto 0));
+      elsif kind = "11" then
+        fixed_byte <= x"03";
       end if;
     elsif place >= 40 then
       fixed_byte <= x"ff";
@@ -310,9 +336,10 @@ begin
       way_place    <= place;
       way_checksum <= at_checksum;
       way_no_zero  <= not round(1);
-      way_clear    <= to_bit(round = 2 and place = 0);
+      way_clear    <= walking and to_bit(round = 2 and place = 0);
       if round = 0 then
-        way_add <= udp and to_bit(place >= 14 and place <= 39);
+        way_add <= (udp and to_bit(place >= 14 and place <= 39)) or
+                   (kind(1) and kind(0) and to_bit(place(5 downto 1) = 17));
       else
         way_add <= to_bit(round = 2 and place >= 14 and place <= 33 and place /= 24 and place /= 25);
       end if;
@@ -370,20 +397,24 @@ begin
   end process p_sum;
 
   -- Slots -------------------------------------------------------------------------------------------------------------
-  s_ready   <= not busy and not (request(0) xor done(0)) when slot = '0' else
-               not busy and not (request(1) xor done(1));
+  s_ready   <= not busy and not down and not (request(0) xor done(0)) when slot = '0' else
+               not busy and not down and not (request(1) xor done(1));
   f_request <= request;
 
-  u_done : entity work.cdc_sync
+  levels <= tx_rst & f_done;
+
+  u_levels : entity work.cdc_sync
     generic map (
-      G_WIDTH => 2
+      G_WIDTH => 3
     )
     port map (
       clk => clk,
-      d   => f_done,
-      q   => done
+      d   => levels,
+      q   => levels_q
     );
 
+  down   <= levels_q(2);
+  done   <= levels_q(1 downto 0);
   change <= done xor done_seen;
   result <= f_result_0 when change(0) = '1' else
             f_result_1;
@@ -394,10 +425,10 @@ begin
       if walking = '1' and finish = '1' then
         slot <= not slot;
         if slot = '0' then
-          request(0) <= not request(0);
+          request(0) <= not done(0);
           f_length_0 <= std_logic_vector(size);
         else
-          request(1) <= not request(1);
+          request(1) <= not done(1);
           f_length_1 <= std_logic_vector(size);
         end if;
       end if;
@@ -405,12 +436,16 @@ begin
       ev_sent      <= (change(0) or change(1)) and to_bit(result = "00");
       ev_excessive <= (change(0) or change(1)) and to_bit(result = "01");
       ev_late      <= (change(0) or change(1)) and to_bit(result = "10");
+      ev_deferred  <= (change(0) or change(1)) and to_bit(result = "11");
       if rst = '1' then
-        slot         <= '0';
+        slot <= '0';
+      end if;
+      if rst = '1' or down = '1' then
         request      <= "00";
         ev_sent      <= '0';
         ev_excessive <= '0';
         ev_late      <= '0';
+        ev_deferred  <= '0';
       end if;
     end if;
   end process p_slots;

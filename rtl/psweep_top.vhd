@@ -2,9 +2,10 @@
 -- psweep_top: the chip: plane-sweep engine, Ethernet arbiter, resets; the pins of an MII PHY (docs/interfaces.md).
 --   Clocks : clk for the engine and the stack, from 30 MHz on; mii_rx_clk and mii_tx_clk from the PHY, 25 or 2.5 MHz.
 --            The three are independent (constraints/)
---   Reset  : arst_n, asynchronous; released in step with each clock, that of clk last: a MAC that clk's side sees fall
---            into its reset late, because the PHY's clock stood still, would look like a MAC that has sent a frame.
---            So nothing works before both clocks of the PHY have run; later they may stop and go on
+--   Reset  : arst_n, asynchronous, through a filter: a pulse that covers at most 15 edges of clk does nothing
+--            (reset_filter). clk's reset makes those of the PHY's clocks, which end in step with them. So the engine and
+--            the stack work without the clocks of the PHY; those may come, stop and go on at any time
+--   clock_missing: bit 0 mii_rx_clk, bit 1 mii_tx_clk: has been missing for 1 to 2 ms or longer
 --   Address: generics; straps are exclusive-ored into the last byte of MAC and IP address
 --   dbg_*  : for waves and tests; leave open
 --   Golden : sw/golden/arbiter.hpp and sw/golden/psweep.hpp
@@ -61,6 +62,7 @@ entity psweep_top is
     straps          : in  std_logic_vector(7 downto 0);
     led_session     : out std_logic;
     led_busy        : out std_logic;
+    clock_missing   : out std_logic_vector(1 downto 0);
 
     -- The engine's streams and state.
     dbg_cfg_tvalid    : out std_logic;
@@ -83,8 +85,6 @@ end entity psweep_top;
 
 architecture rtl of psweep_top is
 
-  signal arst          : std_logic;
-  signal arst_clk      : std_logic;
   signal rst           : std_logic;
   signal rx_rst        : std_logic;
   signal tx_rst        : std_logic;
@@ -113,16 +113,32 @@ architecture rtl of psweep_top is
 begin
 
   assert G_MAC_HI >= 0 and G_MAC_HI <= 16777215
-    report "psweep_top: G_MAC_HI=" & integer'image(G_MAC_HI) & " outside 0..16777215"
+    report "psweep_top: G_MAC_HI"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAC_HI)
+           -- synthesis translate_on
+           & " outside 0..16777215"
     severity failure;
   assert G_MAC_LO >= 0 and G_MAC_LO <= 16777215
-    report "psweep_top: G_MAC_LO=" & integer'image(G_MAC_LO) & " outside 0..16777215"
+    report "psweep_top: G_MAC_LO"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAC_LO)
+           -- synthesis translate_on
+           & " outside 0..16777215"
     severity failure;
   assert G_IP_HI >= 0 and G_IP_HI <= 65535
-    report "psweep_top: G_IP_HI=" & integer'image(G_IP_HI) & " outside 0..65535"
+    report "psweep_top: G_IP_HI"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IP_HI)
+           -- synthesis translate_on
+           & " outside 0..65535"
     severity failure;
   assert G_IP_LO >= 0 and G_IP_LO <= 65535
-    report "psweep_top: G_IP_LO=" & integer'image(G_IP_LO) & " outside 0..65535"
+    report "psweep_top: G_IP_LO"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IP_LO)
+           -- synthesis translate_on
+           & " outside 0..65535"
     severity failure;
 
   own_mac <= std_logic_vector(to_unsigned(G_MAC_HI, 24))
@@ -130,28 +146,24 @@ begin
   own_ip  <= std_logic_vector(to_unsigned(G_IP_HI, 16))
              & (std_logic_vector(to_unsigned(G_IP_LO, 16)) xor (x"00" & straps));
 
-  arst     <= not arst_n;
-  -- Free of glitches: each of the three falls once, and arst before the two others.
-  arst_clk <= arst or rx_rst or tx_rst;
-
-  u_reset : entity work.reset_sync
+  u_reset : entity work.reset_filter
     port map (
-      clk  => clk,
-      arst => arst_clk,
-      rst  => rst
+      clk    => clk,
+      arst_n => arst_n,
+      rst    => rst
     );
 
   u_reset_rx : entity work.reset_sync
     port map (
       clk  => mii_rx_clk,
-      arst => arst,
+      arst => rst,
       rst  => rx_rst
     );
 
   u_reset_tx : entity work.reset_sync
     port map (
       clk  => mii_tx_clk,
-      arst => arst,
+      arst => rst,
       rst  => tx_rst
     );
 
@@ -198,6 +210,7 @@ begin
       pin_full_duplex => phy_full_duplex,
       pin_speed_100   => phy_speed_100,
       session         => led_session,
+      clock_missing   => clock_missing,
       m_cfg_tvalid    => cfg_tvalid,
       m_cfg_tdata     => cfg_tdata,
       m_pix_tvalid    => pix_tvalid,

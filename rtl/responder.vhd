@@ -6,11 +6,20 @@
 --               Rows go on to the row buffer as they pass, one byte a clock. The reply is made byte by byte: its
 --               header is the request's, read again, but for four bytes; its body is one big multiplexer.
 --               A message is obeyed only after packet_rx has found the whole frame good, so nothing has to be undone
---   Map       : between messages, chunk after chunk of the READ in force, as they become available
+--   Map       : between messages, chunk after chunk of the READ in force, as they become available; the first one after
+--               each answer goes before the next message
 --   Rate      : rows and cells one byte a clock; replies one byte in 6 clocks (at 60 MHz a status in 6 us)
---   Session   : one token; silence of G_SESSION_MS aborts all and ends it
+--   Session   : one token and one peer; silence of G_SESSION_MS aborts all and ends it. What has to be remembered of it
+--               lies in a small RAM at the place that it has in a frame (lower six bits): the peer's addresses,
+--               token, nonce, and the header of the READ in force. So one comparator of bytes checks all of them while
+--               a message passes
+--   Token     : a shift register that never stops, 8 steps a clock, into which the nonces are mixed; lowest bit 1
+--   Limits    : OPEN, ARP and all else that is not authentic are answered while there is one left in their bucket
+--   Upsets    : the state has a parity bit: no upset of one bit makes another state of it. From a code without a name,
+--               and when a frame cannot be sent (about 1 s after the session's time, or without a session), it ends
+--               the session and the frame, on both sides, and goes on
 --   Counters  : events(n) is counter n of the protocol
---   Reset     : no session, no READ, duplex by pin
+--   Reset     : no session, no READ, duplex by pin, full buckets
 --   Golden    : sw/golden/arbiter.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -48,7 +57,8 @@ entity responder is
     pin_speed_100   : in  std_logic;
     full_duplex     : out std_logic;
     session         : out std_logic;
-    events          : out std_logic_vector(31 downto 0);
+    events          : out std_logic_vector(39 downto 0);
+    tick_ms         : out std_logic; -- pulse each millisecond of clk
 
     -- packet_rx
     m_valid  : in  std_logic;
@@ -63,6 +73,7 @@ entity responder is
     s_start    : out std_logic;
     s_kind     : out std_logic_vector(1 downto 0);
     s_bank     : out std_logic;
+    tx_abort   : out std_logic; -- pulse: the frame that is being built is given up
     p_valid    : out std_logic;
     p_ready    : in  std_logic;
     p_data     : out std_logic_vector(7 downto 0);
@@ -108,7 +119,7 @@ entity responder is
     f_last       : in  std_logic;
 
     -- counters
-    c_index : out std_logic_vector(4 downto 0);
+    c_index : out std_logic_vector(5 downto 0);
     c_valid : in  std_logic;
     c_data  : in  std_logic_vector(31 downto 0);
 
@@ -153,6 +164,7 @@ architecture rtl of responder is
   constant C_READ     : std_logic_vector(7 downto 0) := x"09";
   constant C_RELEASE  : std_logic_vector(7 downto 0) := x"0a";
   constant C_SET      : std_logic_vector(7 downto 0) := x"0b";
+  constant C_MAP      : std_logic_vector(7 downto 0) := x"8c";
 
   constant C_OK          : std_logic_vector(2 downto 0) := "000";
   constant C_BUSY        : std_logic_vector(2 downto 0) := "001";
@@ -164,6 +176,7 @@ architecture rtl of responder is
   constant C_KIND_ARP  : std_logic_vector(1 downto 0) := "00";
   constant C_KIND_ICMP : std_logic_vector(1 downto 0) := "01";
   constant C_KIND_UDP  : std_logic_vector(1 downto 0) := "10";
+  constant C_KIND_CLOSED : std_logic_vector(1 downto 0) := "11"; -- UDP to a closed port
 
   -- Sizes that follow from the generics.
   constant C_PAIR_BYTES  : integer := (2 * G_PIX_W + 7) / 8;
@@ -175,8 +188,11 @@ architecture rtl of responder is
   constant C_HEADER      : integer := 42;                      -- first byte of the message in the frame
   constant C_ARGUMENTS   : integer := C_HEADER + 16;
   constant C_STATUS_END  : integer := 4 + 9 + C_MAP_WORDS - 1; -- last word of a reply, its header being 0 to 3
-  constant C_TABLE_END   : integer := 4 + 32 - 1;
-  constant C_OUT_W       : integer := clog2(imax(C_STATUS_END, C_TABLE_END) + 1);
+  constant C_HEADER_END  : integer := 4 - 1;
+  constant C_INFO_END    : integer := 4 + 32 - 1;
+  constant C_COUNT_END   : integer := 4 + 40 - 1;
+  constant C_OUT_W       : integer := clog2(imax(C_STATUS_END, C_COUNT_END) + 1);
+  constant C_REST_W      : integer := clog2(C_CHUNK_PAIRS + 1) + 1;
 
   -- Capabilities. Words 14 and 15 are the address, which depends on pins.
   type t_words is array (31 downto 0) of std_logic_vector(31 downto 0);
@@ -184,7 +200,7 @@ architecture rtl of responder is
     variable v_words : t_words;
   begin
     v_words     := (others => (others => '0'));
-    v_words(0)  := std_logic_vector(to_unsigned(1, 16)) & std_logic_vector(to_unsigned(32, 16));
+    v_words(0)  := std_logic_vector(to_unsigned(2, 16)) & std_logic_vector(to_unsigned(32, 16));
     v_words(1)  := std_logic_vector(to_unsigned(G_IMG_COLS, 32));
     v_words(2)  := std_logic_vector(to_unsigned(G_IMG_ROWS, 32));
     v_words(3)  := std_logic_vector(to_unsigned(G_PLANE_COLS, 32));
@@ -208,7 +224,7 @@ architecture rtl of responder is
     v_words(23) := std_logic_vector(to_unsigned(G_MAP_DEPTH, 32));
     v_words(24) := std_logic_vector(to_unsigned(G_SESSION_MS, 32));
     v_words(25) := std_logic_vector(to_unsigned(G_RX_SLOTS, 32));
-    v_words(26) := std_logic_vector(to_unsigned(32, 32));
+    v_words(26) := std_logic_vector(to_unsigned(40, 32));
     v_words(27) := std_logic_vector(to_unsigned(G_RECTIFIED, 32));
     return v_words;
   end function info_words;
@@ -227,22 +243,23 @@ architecture rtl of responder is
 
   type t_bytes is array (63 downto 0) of std_logic_vector(7 downto 0);
 
-  type t_state is (
-    st_idle,   -- the next message, or the next chunk of the map
-    st_header, -- bytes 42 to 57 pass
-    st_decide, -- word = tile and index
-    st_words,  -- arguments pass
-    st_check,  -- the row buffer looks at the chunk
-    st_rows,   -- pixels pass
-    st_wait,   -- for packet_tx
-    st_peer,   -- the sender's addresses go to packet_tx
-    st_fetch,  -- one byte of the reply: address out ..
-    st_show,   -- .. and byte to packet_tx
-    st_cells,  -- bytes of the map to packet_tx
-    st_done,   -- the frame's slot is free
-    st_abort   -- engine, buffers and session
-  );
-  signal state : t_state;
+  -- The state with even parity.
+  constant C_ST_IDLE   : std_logic_vector(4 downto 0) := "00000"; -- the next message, or the next chunk of the map
+  constant C_ST_HEADER : std_logic_vector(4 downto 0) := "00011"; -- bytes 6 to 57 pass
+  constant C_ST_DECIDE : std_logic_vector(4 downto 0) := "00101"; -- word = tile and index
+  constant C_ST_LIMIT  : std_logic_vector(4 downto 0) := "00110"; -- takes an answer from its bucket
+  constant C_ST_WORDS  : std_logic_vector(4 downto 0) := "01001"; -- arguments pass
+  constant C_ST_DIVIDE : std_logic_vector(4 downto 0) := "01010"; -- are these the chunks of so many pixels?
+  constant C_ST_CHECK  : std_logic_vector(4 downto 0) := "01100"; -- the row buffer looks at the chunk
+  constant C_ST_ROWS   : std_logic_vector(4 downto 0) := "01111"; -- pixels pass
+  constant C_ST_WAIT   : std_logic_vector(4 downto 0) := "10001"; -- for packet_tx
+  constant C_ST_PEER   : std_logic_vector(4 downto 0) := "10010"; -- the sender's addresses go to packet_tx
+  constant C_ST_FETCH  : std_logic_vector(4 downto 0) := "10100"; -- one byte of the reply: address out ..
+  constant C_ST_SHOW   : std_logic_vector(4 downto 0) := "10111"; -- .. and byte to packet_tx
+  constant C_ST_CELLS  : std_logic_vector(4 downto 0) := "11000"; -- bytes of the map to packet_tx
+  constant C_ST_DONE   : std_logic_vector(4 downto 0) := "11011"; -- the frame's slot is free
+  constant C_ST_ABORT  : std_logic_vector(4 downto 0) := "11101"; -- engine, buffers and session
+  signal state : std_logic_vector(4 downto 0);
 
   -- Reading the frame: byte hpos is on r_data while have = '1'.
   signal pos       : unsigned(10 downto 0);
@@ -259,6 +276,10 @@ architecture rtl of responder is
   signal magic_ok   : std_logic;
   signal version_ok : std_logic;
   signal token_ok   : std_logic;
+  signal peer_ok    : std_logic;
+  signal nonce_ok   : std_logic;
+  signal differs    : std_logic; -- the byte that passes, from the one in its place in the session's memory
+  signal authentic  : std_logic;
   signal answer     : std_logic;
   signal code       : std_logic_vector(2 downto 0);
   signal silent     : std_logic; -- no reply
@@ -268,12 +289,19 @@ architecture rtl of responder is
   signal long_1     : std_logic; -- at least one word of arguments
   signal long_start : std_logic;
   signal long_write : std_logic; -- exactly a chunk of rows
+  signal long_list  : std_logic; -- INFO, COUNTERS: as long as the answer
 
   -- Session.
   signal open_q      : std_logic;
-  signal token       : std_logic_vector(31 downto 0);
-  signal nonce       : std_logic_vector(31 downto 0);
-  signal dice        : std_logic_vector(31 downto 0); -- next token, never 0
+  signal store      : std_logic; -- OPEN and READ: what the session's memory is to keep is in this frame
+  signal at_peer    : std_logic; -- byte hpos is the sender's MAC, IP or port
+  signal at_head    : std_logic; -- .. of the message's header
+  signal at_token   : std_logic;
+  signal keep_we    : std_logic;
+  signal keep_data  : std_logic_vector(7 downto 0);
+  signal kept       : std_logic_vector(7 downto 0);  -- byte of the session's memory
+  signal dice       : std_logic_vector(31 downto 0); -- next token, but for its lowest bit
+  signal dice_next   : std_logic_vector(7 downto 0);
   signal last_tile   : unsigned(15 downto 0);         -- latest START
   signal map_tile    : unsigned(15 downto 0);
   signal table_id    : unsigned(15 downto 0);
@@ -281,13 +309,32 @@ architecture rtl of responder is
   signal duplex_mode : std_logic_vector(1 downto 0);
   signal pixels      : std_logic_vector(23 downto 0);
   signal chunks      : std_logic_vector(15 downto 0);
-  signal close_q     : std_logic; -- st_abort ends the session, else it begins one
+  signal close_q     : std_logic; -- C_ST_ABORT ends the session, else it begins one
   signal by_timer    : std_logic; -- nobody waits for an answer
   signal known       : unsigned(15 downto 0); -- what the message's number is compared with
   signal distance    : unsigned(15 downto 0);
   signal is_next     : std_logic; -- the number is the known one + 1
   signal is_last     : std_logic;
-  signal idle_chip   : std_logic; -- no tile anywhere but in the map buffer
+  signal idle_chip  : std_logic; -- no tile anywhere but in the map buffer
+
+  -- pixels / C_CHUNK_PAIRS, non-restoring, bit by bit against chunks.
+  signal pixel_bits : std_logic_vector(31 downto 0);
+  signal pixel_bit  : std_logic;
+  signal chunk_bit  : std_logic;
+  signal rest       : unsigned(C_REST_W - 1 downto 0); -- -C_CHUNK_PAIRS .. C_CHUNK_PAIRS-1
+  signal rest_next  : unsigned(C_REST_W - 1 downto 0);
+  signal same       : std_logic; -- chunks so far are the quotient
+  signal one_more   : std_logic; -- chunks so far are the quotient + 1
+
+  -- Answers left: the buckets pass by, ARP, OPEN, all else.
+  signal turn_of   : unsigned(1 downto 0); -- whose bucket is bucket_0
+  signal bucket    : unsigned(1 downto 0); -- which the message needs
+  signal bucket_0  : unsigned(3 downto 0);
+  signal bucket_1  : unsigned(3 downto 0);
+  signal bucket_2  : unsigned(3 downto 0);
+  signal refill    : std_logic_vector(2 downto 0);
+  signal at_bucket : std_logic;
+  signal is_open   : std_logic; -- the message is an OPEN
 
   -- The READ in force.
   signal read_active : std_logic;
@@ -295,29 +342,29 @@ architecture rtl of responder is
   signal read_tile   : unsigned(15 downto 0);
   signal read_next   : unsigned(15 downto 0);
   signal read_left   : unsigned(15 downto 0);
-  signal read_seq    : std_logic_vector(15 downto 0);
   signal keep        : std_logic_vector(15 downto 0);
   signal settle      : std_logic_vector(3 downto 0); -- f_ready may be that of an earlier question
-  signal map_go      : std_logic;
+  signal map_due    : std_logic;
+  signal map_turn   : std_logic; -- something was answered since the latest chunk
 
   -- The reply.
   signal is_map     : std_logic;
   signal is_icmp    : std_logic;
-  signal use_bank_1 : std_logic;
   signal out_word   : unsigned(C_OUT_W - 1 downto 0);
   signal out_byte   : unsigned(1 downto 0);
   signal out_end    : unsigned(C_OUT_W - 1 downto 0);
-  signal step       : unsigned(5 downto 0); -- of st_fetch
+  signal step       : unsigned(5 downto 0); -- of C_ST_FETCH
   signal in_header  : std_logic;
   signal in_bitmap  : std_logic;
   signal lists      : std_logic; -- the message is INFO or COUNTERS
   signal is_list    : std_logic; -- and their body is due
   signal fetched    : std_logic;
-  signal words      : std_logic_vector(415 downto 0);
+  signal words      : std_logic_vector(287 downto 0);
   signal word_bytes : t_bytes;
   signal own_word   : std_logic;
+  signal from_kept  : std_logic;
   signal byte_index : unsigned(5 downto 0);
-  signal body_index : unsigned(4 downto 0); -- of a word in INFO and COUNTERS
+  signal body_index : unsigned(5 downto 0); -- of a word in INFO and COUNTERS
   signal list_index : unsigned(6 downto 0);
   signal list_byte  : std_logic_vector(7 downto 0);
   signal head_byte  : std_logic_vector(7 downto 0);
@@ -329,35 +376,58 @@ architecture rtl of responder is
   signal ms_tick    : std_logic;
   signal quiet_ms   : unsigned(15 downto 0); -- since the session's host was heard
   signal heard      : std_logic;
+  signal lapse      : std_logic; -- .. for as long as a session lasts
   signal expired    : std_logic;
+  signal stuck      : std_logic;
   signal rows_wait  : unsigned(7 downto 0);
   signal map_wait   : unsigned(7 downto 0);
   signal rows_short : std_logic;
 
+  attribute fsm_extract : string;
+
+  attribute fsm_extract of state : signal is C_FSM_KEPT;
+
 begin
 
   assert G_CLK_KHZ >= 1000 and G_CLK_KHZ <= 1000000
-    report "responder: G_CLK_KHZ=" & integer'image(G_CLK_KHZ) & " outside 1000..1000000"
+    report "responder: G_CLK_KHZ"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CLK_KHZ)
+           -- synthesis translate_on
+           & " outside 1000..1000000"
     severity failure;
   assert G_CHUNK_BYTES >= 16 and G_CHUNK_BYTES <= 1440
-    report "responder: G_CHUNK_BYTES=" & integer'image(G_CHUNK_BYTES) & " outside 16..1440"
+    report "responder: G_CHUNK_BYTES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_BYTES)
+           -- synthesis translate_on
+           & " outside 16..1440"
     severity failure;
   assert G_ROW_SLOTS >= 2 and G_ROW_SLOTS <= 1024
-    report "responder: G_ROW_SLOTS=" & integer'image(G_ROW_SLOTS) & " outside 2..1024"
+    report "responder: G_ROW_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_ROW_SLOTS)
+           -- synthesis translate_on
+           & " outside 2..1024"
     severity failure;
   assert G_SESSION_MS >= 1 and G_SESSION_MS <= 65535
-    report "responder: G_SESSION_MS=" & integer'image(G_SESSION_MS) & " outside 1..65535"
+    report "responder: G_SESSION_MS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SESSION_MS)
+           -- synthesis translate_on
+           & " outside 1..65535"
     severity failure;
 
   -- Reading ----------------------------------------------------------------------------------------------------------
-  scanning  <= to_bit(state = st_header or state = st_words or state = st_rows or state = st_peer);
+  scanning  <= to_bit(state = C_ST_HEADER or state = C_ST_WORDS or state = C_ST_ROWS or state = C_ST_PEER);
   r_addr    <= std_logic_vector(pos);
   word_next <= word(23 downto 0) & r_data;
-  word_full <= have and to_bit(hpos(1 downto 0) = 1); -- words begin at byte 42, 46, .., 58, ..
+  word_full <= have and to_bit(hpos(1 downto 0) = 1); -- words begin at byte 6, 10, .., 42, .., 58, ..
 
   long_1     <= to_bit(end_pos >= C_ARGUMENTS + 4);
   long_start <= to_bit(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
   long_write <= to_bit(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
+  long_list  <= to_bit(end_pos >= C_ARGUMENTS + 4 * 40) or (to_bit(end_pos >= C_ARGUMENTS + 4 * 32) and msg_type(0));
 
   -- pos is one ahead.
   words_over <= to_bit(pos = end_pos) when msg_type = C_TABLE
@@ -373,57 +443,80 @@ begin
   is_next  <= to_bit(distance = 1);
   idle_chip <= not row_busy and not staged and not running and to_bit(engine_state = C_STATE_IDLE);
 
-  w_valid    <= have and to_bit(state = st_rows);
+  w_valid    <= have and to_bit(state = C_ST_ROWS);
   w_data     <= r_data;
   w_chunk    <= std_logic_vector(index);
   job_addr   <= std_logic_vector(count + 29); -- the first three words are no registers
   job_data   <= word_next;
-  job_we     <= word_full and to_bit(state = st_words and msg_type = C_START and count >= 3);
-  t_valid    <= word_full and to_bit(state = st_words and msg_type = C_TABLE);
+  job_we     <= word_full and to_bit(state = C_ST_WORDS and msg_type = C_START and count >= 3);
+  t_valid    <= word_full and to_bit(state = C_ST_WORDS and msg_type = C_TABLE);
   t_address  <= '1' & std_logic_vector(index(14 downto 0));
   t_data     <= word_next;
   row_pixels <= pixels;
   row_chunks <= chunks;
   tile       <= std_logic_vector(last_tile);
 
+  -- Sender's MAC, IP and port: bytes 6-11, 26-29, 34-35 of the frame, in ARP 22-27, 28-31; places 0-5, 6-9, 10-11.
+  at_peer    <= to_bit((hpos >= 6 and hpos < 12) or (hpos >= 26 and hpos < 30) or hpos = 34 or hpos = 35);
   peer_data  <= r_data;
-  peer_bank  <= use_bank_1;
+  peer_bank  <= store;
+  peer_we    <= have and to_bit(state = C_ST_PEER) and at_peer when m_kind /= C_KIND_ARP
+                else have and to_bit(state = C_ST_PEER and hpos >= 22 and hpos < 32);
+  -- All modulo 16.
+  peer_index <= std_logic_vector(hpos(3 downto 0) - 6) when m_kind = C_KIND_ARP or hpos < 16
+                else std_logic_vector(hpos(3 downto 0) + 8) when hpos(5) = '1'
+                else std_logic_vector(hpos(3 downto 0) - 4);
 
-  p_peer : process (hpos, have, state, m_kind)
-  begin
-    -- Sender's MAC, IP and port: bytes 6-11, 26-29 (ARP 28-31), 34-35 of the frame; places 0-5, 6-9, 10-11.
-    peer_we    <= '0';
-    peer_index <= std_logic_vector(hpos(3 downto 0) - 6);
-    if hpos >= 6 and hpos < 12 then
-      peer_we <= have and to_bit(state = st_peer);
-    elsif m_kind = C_KIND_ARP then
-      peer_index <= std_logic_vector(hpos(3 downto 0) - 6);       -- 28 becomes 6, mod 16
-      peer_we    <= have and to_bit(state = st_peer and hpos >= 28 and hpos < 32);
-    else
-      peer_index <= std_logic_vector(hpos(3 downto 0) - 4);       -- 26 becomes 6, mod 16
-      peer_we    <= have and to_bit(state = st_peer and hpos >= 26 and hpos < 30);
-      if hpos >= 34 then
-        peer_index <= std_logic_vector(hpos(3 downto 0) + 8);     -- 34 becomes 10, mod 16
-        peer_we    <= have and to_bit(state = st_peer);
-      end if;
-    end if;
-  end process p_peer;
+  -- The session's memory ---------------------------------------------------------------------------------------------
+  -- OPEN writes addresses and nonce, and the new token in place of its own header's; READ writes its header, and the
+  -- rest as it is. OPEN is read up to its nonce, everything else up to the end of the header.
+  at_head   <= to_bit(hpos(5 downto 0) >= 42 and hpos(5 downto 0) < 58);
+  at_token  <= to_bit(hpos(5 downto 0) >= 46 and hpos(5 downto 0) < 50);
+  keep_we   <= have and to_bit(state = C_ST_PEER) and store and (not at_head or not close_q or msg_type(3));
+  keep_data <= dice(7 downto 1) & (dice(0) or (not hpos(1) and hpos(0))) when at_token = '1' and msg_type(3) = '0'
+               else r_data;
+  dice_next <= dice(31 downto 24) xor dice(30 downto 23) xor dice(29 downto 22) xor dice(9 downto 2);
+  differs   <= to_bit(r_data /= kept);
+  authentic <= open_q and version_ok and token_ok and peer_ok;
+
+  u_kept : entity work.ram_sdp
+    generic map (G_DATA_W => 8, G_DEPTH => 64, G_LATENCY => 1)
+    port map (
+      clk   => clk,
+      we    => keep_we,
+      waddr => std_logic_vector(hpos(5 downto 0)),
+      wdata => keep_data,
+      raddr => std_logic_vector(pos(5 downto 0)),
+      rdata => kept
+    );
+
+  -- Chunks of a START ------------------------------------------------------------------------------------------------
+  pixel_bits <= x"00" & pixels;
+  pixel_bit  <= pixel_bits(to_integer(not step(4 downto 0)));
+  chunk_bit  <= step(4) and chunks(to_integer(not step(3 downto 0)));
+  rest_next  <= (rest(C_REST_W - 2 downto 0) & pixel_bit) - C_CHUNK_PAIRS when rest(C_REST_W - 1) = '0'
+                else (rest(C_REST_W - 2 downto 0) & pixel_bit) + C_CHUNK_PAIRS;
+
+  -- Limits -----------------------------------------------------------------------------------------------------------
+  is_open   <= to_bit(m_kind = C_KIND_UDP and msg_type = C_OPEN);
+  bucket(0) <= is_open;
+  bucket(1) <= not is_open and to_bit(m_kind /= C_KIND_ARP);
+  at_bucket <= to_bit(state = C_ST_LIMIT and turn_of = bucket);
 
   -- Map --------------------------------------------------------------------------------------------------------------
   f_chunk  <= std_logic_vector(read_next);
   map_keep <= keep;
-  map_go   <= read_active and map_busy and f_ready and s_ready and not settle(0)
-              and to_bit(read_tile = map_tile);
-  f_take   <= p_ready and to_bit(state = st_cells);
+  map_due  <= read_active and map_busy and f_ready and not settle(0) and to_bit(read_tile = map_tile);
+  f_take   <= p_ready and to_bit(state = C_ST_CELLS);
 
   -- Reply ------------------------------------------------------------------------------------------------------------
   s_kind    <= C_KIND_UDP when is_map = '1' else m_kind;
-  s_bank    <= use_bank_1;
+  s_bank     <= store;
   in_header <= to_bit(out_word < 4);
   in_bitmap <= to_bit(out_word >= 13) and not is_list and not is_map;
   is_list   <= lists and not in_header and not is_map;
   at_end    <= to_bit(out_word = out_end and out_byte = 3);
-  body_index <= out_word(4 downto 0) - 4;
+  body_index <= resize(out_word, 6) - 4;
   c_index   <= std_logic_vector(body_index);
   -- From the first word of a status block to the last.
   b_hold    <= not in_header and not lists and not is_map;
@@ -432,12 +525,8 @@ begin
   status <= "00000" & engine_state & pin_speed_100 & (duplex_mode(1) or (pin_full_duplex and not duplex_mode(0)))
             & failed & map_complete & map_busy & running & row_busy & open_q;
 
-  -- Bytes of map packets (words 0 to 3; word 1 also for OPEN) and of the status block (4 to 12).
-  words <= x"5053018c"
-           & token
-           & read_seq & x"0000"
-           & std_logic_vector(read_tile) & std_logic_vector(read_next)
-           & std_logic_vector(last_tile) & status
+  -- Bytes of the status block (words 4 to 12).
+  words <= std_logic_vector(last_tile) & status
            & run_tile & std_logic_vector(map_tile)
            & row_base & row_received
            & std_logic_vector(table_id) & "00" & std_logic_vector(table_words)
@@ -447,36 +536,49 @@ begin
            & tile_clocks
            & window_errors & failed_tile;
 
-  g_bytes : for i in 0 to 51 generate
-    word_bytes(i) <= words(415 - 8 * i downto 408 - 8 * i);
+  g_bytes : for i in 0 to 35 generate
+    word_bytes(16 + i) <= words(287 - 8 * i downto 280 - 8 * i);
   end generate g_bytes;
 
-  g_no_bytes : for i in 52 to 63 generate
+  -- In the header of a map packet, where the request has its first chunk.
+  word_bytes(14) <= std_logic_vector(read_next(15 downto 8));
+  word_bytes(15) <= std_logic_vector(read_next(7 downto 0));
+
+  g_low : for i in 0 to 13 generate
     word_bytes(i) <= (others => '-');
-  end generate g_no_bytes;
+  end generate g_low;
 
-  own_word   <= to_bit(out_word(0) = '1' and out_word(1) = '0' and msg_type = C_OPEN and code = C_OK); -- the token
+  g_high : for i in 52 to 63 generate
+    word_bytes(i) <= (others => '-');
+  end generate g_high;
+
+  own_word   <= to_bit(out_word(0) = '1' and out_word(1) = '1' and out_byte(1) = '1') and is_map;
   byte_index <= out_word(3 downto 0) & out_byte;
-  list_index <= body_index & out_byte;
+  list_index <= body_index(4 downto 0) & out_byte;
 
-  p_data <= f_data when state = st_cells
-            else r_data when is_icmp = '1'
-            else head_byte when in_header = '1' and is_map = '0' and own_word = '0'
+  p_data <= f_data when state = C_ST_CELLS
+            else head_byte when in_header = '1' and own_word = '0'
             else list_byte when is_list = '1'
             else word(7 downto 0) when in_bitmap = '1'
             else word_bytes(to_integer(byte_index));
 
-  -- Header of a reply: the request's bytes, but version, type, code and a zero (and OPEN's token).
-  p_head : process (out_word, out_byte, r_data, msg_type, code)
+  -- Header of a reply: the request's bytes, but version, type, code and a zero, and OPEN's token. Header of a map
+  -- packet: that of its READ, likewise. ICMP: words 0 and 1, whose first and last bytes are the frame's, and that zero.
+  from_kept <= is_map or (store and to_bit(out_word(1 downto 0) = 1));
+
+  p_head : process (out_word, out_byte, r_data, kept, from_kept, msg_type, code)
   begin
     head_byte <= r_data;
-    if out_word = 0 and out_byte = 2 then
-      head_byte <= x"01";
-    elsif out_word = 0 and out_byte = 3 then
+    if from_kept = '1' then
+      head_byte <= kept;
+    end if;
+    if out_word(1 downto 0) = 0 and out_byte = 2 then
+      head_byte <= x"02";
+    elsif out_word(1 downto 0) = 0 and out_byte = 3 then
       head_byte <= msg_type or x"80";
-    elsif out_word = 2 and out_byte = 2 then
+    elsif out_word(1 downto 0) = 2 and out_byte = 2 then
       head_byte <= "00000" & code;
-    elsif out_word = 2 and out_byte = 3 then
+    elsif out_word(1 downto 0) = 2 and out_byte = 3 then
       head_byte <= x"00";
     end if;
   end process p_head;
@@ -493,16 +595,18 @@ begin
                else own_mac(7 downto 0) when body_index = 15
                else C_INFO_BYTES(to_integer(list_index));
 
-  p_valid <= f_valid when state = st_cells else to_bit(state = st_show);
-  p_last  <= f_last when state = st_cells else at_end and not is_map;
+  p_valid <= f_valid when state = C_ST_CELLS else to_bit(state = C_ST_SHOW);
+  p_last  <= f_last when state = C_ST_CELLS else at_end and not is_map;
 
   -- A byte is there three clocks after its number (later if a counter takes longer), one of the bitmap after its bits.
-  fetched <= to_bit(step = 9) when in_bitmap = '1' and is_icmp = '0'
+  fetched <= to_bit(step = 9) when in_bitmap = '1'
              else to_bit(step >= 3) and (c_valid or not is_list or not msg_type(2));
 
   -- The one process of the sequence ----------------------------------------------------------------------------------
   p_sequence : process (clk)
-    variable v_go : std_logic;
+    variable v_go      : std_logic;
+    variable v_bad     : std_logic; -- counted, code 3
+    variable v_recover : std_logic;
   begin
     if rising_edge(clk) then
       s_start     <= '0';
@@ -522,6 +626,13 @@ begin
       events(26)  <= '0';
       events(27)  <= '0';
       events(28)  <= '0';
+      events(30)  <= '0';
+      events(31)  <= '0';
+      events(34)  <= '0';
+      events(35)  <= '0';
+      tx_abort    <= '0';
+      v_recover   := '0';
+      v_bad       := '0';
 
       have <= scanning;
       hpos <= pos;
@@ -533,24 +644,47 @@ begin
         map_tile <= unsigned(run_tile);
         settle   <= (others => '1');
       end if;
-      if ms_tick = '1' and expired = '0' then
+      if ms_tick = '1' then
         quiet_ms <= quiet_ms + 1;
       end if;
+      if lapse = '1' then
+        quiet_ms <= (others => '0');
+        expired  <= '1';
+      end if;
       heard <= '0';
+      if differs = '1' and have = '1' then
+        if at_peer = '1' then
+          peer_ok <= '0';
+        end if;
+        if at_token = '1' then
+          token_ok <= '0';
+        end if;
+        if hpos >= C_ARGUMENTS then
+          nonce_ok <= '0';
+        end if;
+      end if;
 
       if have = '1' then
         word <= word_next;
-      elsif state = st_fetch then
+      elsif state = C_ST_FETCH then
         word(7 downto 0) <= word(6 downto 0) & b_bit; -- the first ones fall out again
       end if;
 
-      if state = st_idle then
+      if state = C_ST_IDLE then
         is_map     <= '0';
         is_icmp    <= '0';
         lists      <= '0';
-        use_bank_1 <= '0';
+        store      <= '0';
         silent     <= '0';
         by_timer   <= '0';
+        close_q    <= '1';
+        peer_ok    <= '1';
+        token_ok   <= '1';
+        nonce_ok   <= '1';
+        same       <= '1';
+        one_more   <= '0';
+        rest       <= (others => '0');
+        heard      <= not open_q; -- without a session the time is that of a message
         code       <= C_OK;
         count      <= (others => '0');
         out_word   <= (others => '0');
@@ -558,107 +692,116 @@ begin
         out_end    <= to_unsigned(C_STATUS_END, C_OUT_W);
         step       <= (others => '0');
         have       <= '0';
-        pos        <= to_unsigned(C_HEADER, 11);
-        end_pos    <= unsigned(m_length) + C_HEADER;
+        pos        <= to_unsigned(6, 11);
+        end_pos <= unsigned(m_length) + C_HEADER;
         if open_q = '1' and expired = '1' then
           events(23) <= '1';
-          close_q    <= '1';
           by_timer   <= '1';
-          state      <= st_abort;
-        elsif m_valid = '1' then
+          state      <= C_ST_ABORT;
+        elsif m_valid = '1' and (map_turn = '0' or map_due = '0') then
           if m_kind = C_KIND_UDP then
-            state <= st_header;
+            state <= C_ST_HEADER;
           else
-            is_icmp <= to_bit(m_kind = C_KIND_ICMP);
-            state   <= st_wait;
+            is_icmp <= m_kind(0);
+            state   <= C_ST_LIMIT;
           end if;
-        elsif map_go = '1' then
+        elsif map_due = '1' and s_ready = '1' then
           is_map     <= '1';
-          use_bank_1 <= '1';
+          store      <= '1';
+          map_turn   <= '0';
+          msg_type   <= C_MAP;
+          pos        <= to_unsigned(C_HEADER, 11);
           f_start    <= '1';
           s_start    <= '1';
           events(28) <= '1';
-          state      <= st_fetch;
+          state      <= C_ST_FETCH;
         end if;
 
-      elsif state = st_header then
+      elsif state = C_ST_HEADER then
         if have = '1' then
           if hpos = C_HEADER + 3 then
             msg_type   <= r_data;
             magic_ok   <= to_bit(word_next(31 downto 16) = x"5053");
-            version_ok <= to_bit(word_next(15 downto 8) = x"01");
-          elsif hpos = C_HEADER + 7 then
-            token_ok <= open_q and to_bit(word_next = token);
-          elsif hpos = C_HEADER + 9 then
-            if msg_type = C_READ and token_ok = '1' and magic_ok = '1' and version_ok = '1' and long_1 = '1' then
-              read_seq <= word_next(15 downto 0);
-            end if;
+            version_ok <= to_bit(word_next(15 downto 8) = x"02");
           elsif hpos = C_HEADER + 10 then
             answer <= r_data(0);
           elsif hpos = C_HEADER + 15 then
             have  <= '0';
-            state <= st_decide;
+            state <= C_ST_DECIDE;
           end if;
         end if;
 
-      elsif state = st_decide then
+      elsif state = C_ST_DECIDE then
         index     <= unsigned(word(15 downto 0));
         of_map    <= is_last;
         pos       <= to_unsigned(C_ARGUMENTS, 11);
-        state     <= st_wait;
+        state     <= C_ST_WAIT;
         v_go      := '0';
+        heard     <= authentic;
+        if authentic = '0' then
+          out_end <= to_unsigned(C_HEADER_END, C_OUT_W);
+          state   <= C_ST_LIMIT;
+        end if;
         if magic_ok = '0' or end_pos < C_ARGUMENTS then
-          events(16) <= '1';
-          silent     <= '1';
-          state      <= st_done;
-        elsif version_ok = '0' or msg_type = x"00" or unsigned(msg_type) > unsigned(C_SET) then
-          events(16) <= '1';
-          code       <= C_BAD_MESSAGE;
-        elsif msg_type = C_INFO or msg_type = C_COUNTERS then
-          out_end <= to_unsigned(C_TABLE_END, C_OUT_W);
-          lists   <= '1';
+          v_bad := '1';
+          heard <= '0';
+          state <= C_ST_DONE;
+        elsif msg_type(7) = '1' then
+          events(31) <= '1';
+          heard      <= '0';
+          state      <= C_ST_DONE;
         elsif msg_type = C_OPEN then
-          v_go := '1';
+          v_bad   := not version_ok or not long_1;
+          out_end <= to_unsigned(C_HEADER_END, C_OUT_W);
+          state   <= C_ST_LIMIT;
+        elsif version_ok = '0' or msg_type = x"00" or unsigned(msg_type) > unsigned(C_SET) then
+          v_bad := '1';
+        elsif msg_type = C_INFO or msg_type = C_COUNTERS then
+          lists <= long_list;
+          v_bad := not long_list;
+          if long_list = '0' then
+            out_end <= to_unsigned(C_HEADER_END, C_OUT_W);
+          elsif msg_type(2) = '1' then
+            out_end <= to_unsigned(C_COUNT_END, C_OUT_W);
+          else
+            out_end <= to_unsigned(C_INFO_END, C_OUT_W);
+          end if;
         elsif open_q = '0' then
           if msg_type /= C_CLOSE then
             code <= C_NO_SESSION;
           end if;
-        elsif token_ok = '0' then
+        elsif authentic = '0' then
           events(17) <= '1';
           code       <= C_BUSY;
         else
-          v_go     := '1';
-          heard    <= '1';
+          v_go := '1';
         end if;
         if v_go = '1' then
           if msg_type = C_CLOSE then
-            close_q <= '1';
-            state   <= st_abort;
-          elsif msg_type = C_OPEN or msg_type = C_READ or msg_type = C_SET then
+            state <= C_ST_ABORT;
+          elsif msg_type = C_READ or msg_type = C_SET then
             if long_1 = '1' then
-              state <= st_words;
+              state <= C_ST_WORDS;
             else
-              events(16) <= '1';
-              code       <= C_BAD_MESSAGE;
+              v_bad := '1';
             end if;
             if msg_type = C_READ and long_1 = '1' then
               read_active <= '0';
               read_tile   <= unsigned(word(31 downto 16));
               read_next   <= unsigned(word(15 downto 0));
-              use_bank_1  <= '1';
+              store       <= '1';
             end if;
           elsif msg_type = C_TABLE then
             -- Frame byte 42 is 2 mod 4.
             if long_1 = '0' or end_pos(1 downto 0) /= 2 then
-              events(16) <= '1';
-              code       <= C_BAD_MESSAGE;
+              v_bad := '1';
             elsif is_last = '1' then
               if unsigned(word(15 downto 0)) > table_words or table_id = 0 then
                 code <= C_ORDER;
               elsif idle_chip = '0' then
                 code <= C_NOT_READY;
               else
-                state <= st_words;
+                state <= C_ST_WORDS;
               end if;
             elsif is_next = '1' and unsigned(word(15 downto 0)) = 0 then
               if idle_chip = '0' then
@@ -666,20 +809,19 @@ begin
               else
                 table_words <= (others => '0');
                 table_id    <= table_id + 1;
-                state       <= st_words;
+                state       <= C_ST_WORDS;
               end if;
             else
               code <= C_ORDER;
             end if;
           elsif msg_type = C_START then
             if long_start = '0' then
-              events(16) <= '1';
-              code       <= C_BAD_MESSAGE;
+              v_bad := '1';
             elsif is_next = '1' then
               if row_busy = '1' or staged = '1' then
                 code <= C_NOT_READY;
               else
-                state <= st_words;
+                state <= C_ST_WORDS;
               end if;
             elsif is_last = '0' then
               code <= C_ORDER;
@@ -687,13 +829,12 @@ begin
           elsif msg_type = C_WRITE then
             silent <= not answer;
             if long_write = '0' then
-              events(16) <= '1';
-              code       <= C_BAD_MESSAGE;
+              v_bad := '1';
             elsif is_last = '0' then
               code <= C_ORDER;
             elsif row_busy = '1' then
               w_check <= '1';
-              state   <= st_check;
+              state   <= C_ST_CHECK;
             end if;
           elsif msg_type = C_RELEASE then
             if is_last = '0' then
@@ -706,27 +847,37 @@ begin
           end if;
         end if;
 
-      elsif state = st_words then
+      elsif state = C_ST_LIMIT then
+        if at_bucket = '1' then
+          state <= C_ST_WAIT;
+          if bucket_0 = 0 then
+            events(30) <= '1';
+            state      <= C_ST_DONE;
+          elsif is_open = '1' and code = C_OK then
+            state <= C_ST_WORDS;
+          end if;
+        end if;
+
+      elsif state = C_ST_WORDS then
         if word_full = '1' then
           if count /= 31 then
             count <= count + 1;
           end if;
           if words_over = '1' then
             have  <= '0';
-            state <= st_wait;
+            state <= C_ST_WAIT;
           end if;
           if msg_type = C_OPEN then
-            nonce <= word_next;
             if open_q = '0' then
-              token    <= dice;
-              close_q  <= '0';
-              state    <= st_abort;
-            elsif word_next /= nonce then
-              nonce      <= nonce;
+              store   <= '1';
+              close_q <= '0';
+              state   <= C_ST_ABORT;
+            elsif nonce_ok = '1' and differs = '0' and (peer_ok = '1' or token_ok = '1') then
+              store <= '1';
+              heard <= '1';
+            else
               events(17) <= '1';
               code       <= C_BUSY;
-            else
-              heard <= '1';
             end if;
           elsif msg_type = C_READ then
             read_left   <= unsigned(word_next(31 downto 16));
@@ -739,8 +890,7 @@ begin
             if index = 0 and unsigned(word_next(31 downto 2)) = 0 and word_next(1 downto 0) /= "11" then
               duplex_mode <= word_next(1 downto 0);
             else
-              events(16) <= '1';
-              code       <= C_BAD_MESSAGE;
+              v_bad := '1';
             end if;
           elsif msg_type = C_TABLE then
             index <= index + 1;
@@ -752,20 +902,19 @@ begin
             if count = 0 and unsigned(word_next(31 downto 16)) /= table_id then
               code  <= C_ORDER;
               have  <= '0';
-              state <= st_wait;
+              state <= C_ST_WAIT;
             elsif (count = 1 and (unsigned(word_next) = 0 or unsigned(word_next(31 downto 24)) /= 0))
                   or (count = 2 and (unsigned(word_next) = 0 or unsigned(word_next(31 downto 16)) /= 0)) then
-              events(16) <= '1';
-              code       <= C_BAD_MESSAGE;
-              have       <= '0';
-              state      <= st_wait;
+              v_bad := '1';
+              have  <= '0';
+              state <= C_ST_WAIT;
             elsif count = 7 and unsigned(word_next(10 downto 0)) > table_words(13 downto 3) then
               code  <= C_ORDER;
               have  <= '0';
-              state <= st_wait;
+              state <= C_ST_WAIT;
             elsif words_over = '1' then
-              row_open  <= '1';
-              last_tile <= last_tile + 1;
+              step  <= to_unsigned(8, 6);
+              state <= C_ST_DIVIDE;
             end if;
             if count = 1 then
               pixels <= word_next(23 downto 0);
@@ -775,15 +924,34 @@ begin
           end if;
         end if;
 
-      elsif state = st_check then
+      elsif state = C_ST_DIVIDE then
+        -- Bits 23 to 0.
+        step <= step + 1;
+        if step(5) = '0' then
+          rest     <= rest_next;
+          same     <= same and (chunk_bit xor rest_next(C_REST_W - 1));
+          one_more <= (same and chunk_bit and rest_next(C_REST_W - 1))
+                      or (one_more and not chunk_bit and not rest_next(C_REST_W - 1));
+        else
+          state <= C_ST_WAIT;
+          if (same = '1' and (rest = 0 or rest = 2 ** C_REST_W - C_CHUNK_PAIRS))
+             or (one_more = '1' and rest /= 0 and rest /= 2 ** C_REST_W - C_CHUNK_PAIRS) then
+            row_open  <= '1';
+            last_tile <= last_tile + 1;
+          else
+            v_bad := '1';
+          end if;
+        end if;
+
+      elsif state = C_ST_CHECK then
         -- Three clocks after w_check.
         step <= step + 1;
         if step = 3 then
           step <= (others => '0');
           if w_new = '1' then
-            state <= st_rows;
+            state <= C_ST_ROWS;
           else
-            state      <= st_wait;
+            state      <= C_ST_WAIT;
             events(26) <= w_repeated;
             events(27) <= not w_repeated;
             if w_repeated = '0' then
@@ -792,70 +960,79 @@ begin
           end if;
         end if;
 
-      elsif state = st_rows then
+      elsif state = C_ST_ROWS then
         if have = '1' and hpos = C_ARGUMENTS + C_WRITE_BYTES - 1 then
           have     <= '0';
           w_commit <= '1';
-          state    <= st_wait;
+          state    <= C_ST_WAIT;
         end if;
 
-      elsif state = st_wait then
+      elsif state = C_ST_WAIT then
         pos <= to_unsigned(6, 11);
         if silent = '1' then
-          state <= st_done;
+          state <= C_ST_DONE;
         elsif s_ready = '1' then
-          state <= st_peer;
+          state <= C_ST_PEER;
         end if;
 
-      elsif state = st_peer then
-        if have = '1' and hpos = 35 then
-          have    <= '0';
-          s_start <= '1';
-          pos     <= to_unsigned(C_HEADER, 11);
-          step    <= (others => '0');
-          state   <= st_fetch;
+      elsif state = C_ST_PEER then
+        if have = '1' and (hpos(5 downto 0) = 61 or (hpos(5 downto 0) = 57 and (store = '0' or msg_type(3) = '1'))) then
+          have       <= '0';
+          s_start    <= '1';
+          map_turn   <= '1';
+          pos        <= to_unsigned(C_HEADER, 11);
+          step       <= (others => '0');
+          state      <= C_ST_FETCH;
+          events(34) <= m_kind(1) and m_kind(0);
           if m_kind = C_KIND_ARP then
-            state <= st_done;
+            state <= C_ST_DONE;
           elsif m_kind = C_KIND_ICMP then
             pos     <= to_unsigned(38, 11);
             end_pos <= unsigned(m_length) + 34;
+          elsif m_kind = C_KIND_CLOSED then -- four zeros in place of bytes 10 to 13
+            pos      <= to_unsigned(10, 11);
+            end_pos  <= to_unsigned(42, 11);
+            out_word <= to_unsigned(2, C_OUT_W);
+            out_byte <= "11";
           end if;
         end if;
 
-      elsif state = st_fetch then
+      elsif state = C_ST_FETCH then
         step <= step + 1;
         if fetched = '1' then
           step  <= (others => '0');
-          state <= st_show;
+          state <= C_ST_SHOW;
         end if;
 
-      elsif state = st_show then
+      elsif state = C_ST_SHOW then
         if p_ready = '1' then
           pos      <= pos + 1;
           out_byte <= out_byte + 1;
           if out_byte = 3 then
             out_word <= out_word + 1;
           end if;
-          state <= st_fetch;
+          state <= C_ST_FETCH;
           if is_icmp = '1' then
             out_word <= (others => '0');
+            out_byte <= "00";
             if pos + 2 = end_pos then -- the byte after this one is the last
-              out_end  <= (others => '0');
-              out_word <= (others => '0');
+              out_end  <= to_unsigned(1, C_OUT_W);
+              out_word <= to_unsigned(1, C_OUT_W);
               out_byte <= "11";
             elsif at_end = '1' then
-              state <= st_done;
-            else
-              out_byte <= "00";
+              state <= C_ST_DONE;
+            elsif m_kind(1) = '1' and pos < 13 then
+              out_word <= to_unsigned(2, C_OUT_W);
+              out_byte <= "11";
             end if;
           elsif is_map = '1' and out_word = 3 and out_byte = 3 then
-            state <= st_cells;
+            state <= C_ST_CELLS;
           elsif at_end = '1' and is_map = '0' then
-            state <= st_done;
+            state <= C_ST_DONE;
           end if;
         end if;
 
-      elsif state = st_cells then
+      elsif state = C_ST_CELLS then
         if f_valid = '1' and p_ready = '1' and f_last = '1' then
           read_next <= read_next + 1;
           read_left <= read_left - 1;
@@ -863,31 +1040,52 @@ begin
           if read_left = 1 then
             read_active <= '0';
           end if;
-          state <= st_idle;
+          state <= C_ST_IDLE;
         end if;
 
-      elsif state = st_done then
-        m_done <= '1';
+      elsif state = C_ST_DONE then
+        m_done <= m_valid and not is_map;
         -- One clock for m_valid to fall.
         step   <= step + 1;
         if step /= 0 then
           m_done <= '0';
           if step = 3 then
-            state <= st_idle;
+            state <= C_ST_IDLE;
           end if;
         end if;
 
-      elsif state = st_abort then
+      elsif state = C_ST_ABORT then
         stop        <= '1';
         row_clear   <= '1';
         map_clear   <= '1';
         open_q      <= not close_q;
         heard       <= '1';
         events(22)  <= not close_q;
-        state       <= st_wait;
+        state       <= C_ST_WAIT;
         if by_timer = '1' then
-          state <= st_idle;
+          state <= C_ST_IDLE;
         end if;
+
+      else
+        v_recover := '1';
+      end if;
+
+      if v_bad = '1' then
+        events(16) <= '1';
+        code       <= C_BAD_MESSAGE;
+      end if;
+      if stuck = '1' and heard = '0' and state /= C_ST_IDLE then
+        v_recover := '1';
+      end if;
+      if v_recover = '1' then
+        events(35) <= '1';
+        tx_abort   <= '1';
+        silent     <= '1';
+        by_timer   <= '0';
+        close_q    <= '1';
+        heard      <= '1';
+        have       <= '0';
+        state      <= C_ST_ABORT;
       end if;
 
       -- Written last, and alone, so that they become resets of the flip-flops.
@@ -896,19 +1094,21 @@ begin
       end if;
       if heard = '1' then
         quiet_ms <= (others => '0');
+        expired  <= '0';
       end if;
-      if rst = '1' or state = st_abort then
+      if rst = '1' or state = C_ST_ABORT then
         read_active <= '0';
+        duplex_mode <= "00";
         last_tile   <= (others => '1');
         map_tile    <= (others => '1');
         table_id    <= (others => '0');
         table_words <= (others => '0');
       end if;
       if rst = '1' then
-        state       <= st_idle;
+        state       <= C_ST_IDLE;
         open_q      <= '0';
         have        <= '0';
-        duplex_mode <= "00";
+        map_turn    <= '0';
       end if;
     end if;
   end process p_sequence;
@@ -917,8 +1117,31 @@ begin
   p_time : process (clk)
   begin
     if rising_edge(clk) then
-      -- x^32 + x^22 + x^2 + x + 1, maximal; which token comes depends on when the host asks.
-      dice     <= dice(30 downto 0) & (dice(31) xor dice(21) xor dice(1) xor dice(0));
+      -- x^32 + x^22 + x^2 + x + 1, maximal, 8 steps at once. Arguments are mixed in, the nonces of OPEN among them; and
+      -- the milliseconds, so that it does not stay at zero. Which token comes depends on all that and on the time.
+      dice <= dice(23 downto 0) & dice_next;
+      if have = '1' and state = C_ST_WORDS then
+        dice(7 downto 0) <= dice_next xor r_data;
+      elsif ms_tick = '1' then
+        dice(0) <= not dice_next(0);
+      end if;
+
+      turn_of  <= turn_of + 1;
+      bucket_0 <= bucket_1;
+      bucket_1 <= bucket_2;
+      bucket_2 <= bucket_0;
+      refill   <= refill(1 downto 0) & ms_tick;
+      if turn_of = 2 then
+        turn_of <= (others => '0');
+      end if;
+      if at_bucket = '1' and bucket_0 /= 0 then
+        if refill = "000" then
+          bucket_2 <= bucket_0 - 1;
+        end if;
+      elsif refill /= "000" and bucket_0 /= 15 then
+        bucket_2 <= bucket_0 + 1;
+      end if;
+
       ms_tick  <= to_bit(ms_clock = G_CLK_KHZ - 1);
       ms_clock <= ms_clock + 1;
 
@@ -936,6 +1159,11 @@ begin
 
       if rst = '1' then
         dice      <= x"5eed1234";
+        turn_of   <= (others => '0');
+        bucket_0  <= (others => '1');
+        bucket_1  <= (others => '1');
+        bucket_2  <= (others => '1');
+        refill    <= (others => '0');
         rows_wait <= (others => '0');
         map_wait  <= (others => '0');
         events(24) <= '0';
@@ -947,12 +1175,27 @@ begin
     end if;
   end process p_time;
 
-  expired     <= to_bit(quiet_ms = G_SESSION_MS);
+  lapse       <= ms_tick and to_bit(quiet_ms = G_SESSION_MS - 1);
+  stuck       <= (expired or not open_q) and (lapse or quiet_ms(10));
   full_duplex <= duplex_mode(1) or (pin_full_duplex and not duplex_mode(0));
   session     <= open_q;
 
   events(15 downto 0)  <= (others => '0');
   events(21 downto 18) <= (others => '0');
-  events(31 downto 29) <= (others => '0');
+  tick_ms              <= ms_tick;
+  events(29)           <= '0';
+  events(33 downto 32) <= (others => '0');
+  events(39 downto 36) <= (others => '0');
+
+  -- synthesis translate_off
+  p_rules : process (clk)
+  begin
+    if rising_edge(clk) then
+      assert rst = '1' or not is_x(state)
+        report "responder: an unknown state"
+        severity failure;
+    end if;
+  end process p_rules;
+  -- synthesis translate_on
 
 end architecture rtl;

@@ -18,6 +18,11 @@
 --              it was read); after clear and after reset the same number of clocks
 --   complete : before go: all chunks of the tile or all slots are full. After go it means nothing
 --   clear    : obeyed in every clock; a pair on m_* vanishes
+--   fail     : the launched tile has failed in the engine: if its rows, or its last pair, are still here, as clear.
+--              Rows of the next tile stay
+--   staged   : from the clock after open_tile until go
+--   Upsets   : idle, clearing, staged and running differ in two bits; any other code: as clear, and recovered for a
+--              clock. A tile that was inside is lost
 --   Golden   : sw/golden/row_buffer.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -38,7 +43,10 @@ entity row_buffer is
     open_tile   : in  std_logic;
     open_pixels : in  std_logic_vector(23 downto 0);
     open_chunks : in  std_logic_vector(15 downto 0);
+    fail        : in  std_logic;
+    recovered   : out std_logic;
     busy        : out std_logic;
+    staged      : out std_logic;
     base        : out std_logic_vector(15 downto 0); -- chunks consumed
     received    : out std_logic_vector(15 downto 0); -- chunks stored, consumed ones included
 
@@ -73,10 +81,15 @@ architecture rtl of row_buffer is
   constant C_BITS       : integer := 2 ** C_SLOT_W;
   constant C_LAST       : integer := (G_CHUNK_PAIRS - 1) * G_SLOTS; -- address of the last pair in slot 0
 
-  -- State of the tile. active: from open_tile until its last pair has been read. running: from go on.
-  signal active    : std_logic;
+  -- State of the tile: none of the four (idle), or busy_q and one of the others. active: staged or running, from
+  -- open_tile until its last pair has been read.
+  signal busy_q    : std_logic;
+  signal staged_q  : std_logic;
   signal running   : std_logic;
   signal clearing  : std_logic;
+  signal active    : std_logic;
+  signal illegal   : std_logic;
+  signal wipe      : std_logic;
   signal chunks    : unsigned(15 downto 0);
   signal base_q    : unsigned(15 downto 0);
   signal base_slot : unsigned(C_SLOT_W - 1 downto 0); -- base mod G_SLOTS
@@ -138,18 +151,36 @@ architecture rtl of row_buffer is
 begin
 
   assert G_PIX_W >= 1 and G_PIX_W <= 12
-    report "row_buffer: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    report "row_buffer: G_PIX_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PIX_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   -- With 1 there would be no clock to look ahead for the next chunk.
   assert G_CHUNK_PAIRS >= 2 and G_CHUNK_PAIRS <= 2048
-    report "row_buffer: G_CHUNK_PAIRS=" & integer'image(G_CHUNK_PAIRS) & " outside 2..2048"
+    report "row_buffer: G_CHUNK_PAIRS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_PAIRS)
+           -- synthesis translate_on
+           & " outside 2..2048"
     severity failure;
   assert G_SLOTS >= 2 and G_SLOTS <= 1024
-    report "row_buffer: G_SLOTS=" & integer'image(G_SLOTS) & " outside 2..1024"
+    report "row_buffer: G_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SLOTS)
+           -- synthesis translate_on
+           & " outside 2..1024"
     severity failure;
 
   -- Tile -------------------------------------------------------------------------------------------------------------
-  busy      <= active or clearing or out_valid;
+  busy      <= busy_q or out_valid;
+  staged    <= staged_q;
+  active    <= staged_q or running;
+  illegal   <= (busy_q xor staged_q xor running xor clearing) or (not busy_q and (staged_q or running or clearing));
+  recovered <= illegal and not rst;
+  -- Without the row of its last pair the tile is over, but that pair would become the first of the next one.
+  wipe      <= clear or illegal or (fail and (running or (out_valid and not staged_q)));
   base      <= std_logic_vector(base_q);
   received  <= std_logic_vector(stored);
   left_one  <= to_bit(left = 1);
@@ -160,8 +191,9 @@ begin
   begin
     if rising_edge(clk) then
       complete <= active and (to_bit(stored = chunks) or to_bit(stored = G_SLOTS));
-      if go = '1' then
-        running <= active;
+      if go = '1' and staged_q = '1' then
+        staged_q <= '0';
+        running  <= '1';
       end if;
       if commit = '1' then
         stored <= stored + 1;
@@ -173,28 +205,30 @@ begin
       if issue = '1' or clearing = '1' then
         left <= left - 1;
       end if;
-      if clear_end = '1' then
+      if clearing = '1' and clear_end = '1' then
         clearing <= '0';
+        busy_q   <= '0';
       end if;
       if issue = '1' and left_one = '1' then
-        active   <= '0';
         running  <= '0';
         clearing <= '1';
       end if;
       if open_tile = '1' then
-        active <= '1';
-        chunks <= unsigned(open_chunks);
-        left   <= unsigned(open_pixels);
+        staged_q <= '1';
+        busy_q   <= '1';
+        chunks   <= unsigned(open_chunks);
+        left     <= unsigned(open_pixels);
       end if;
-      if open_tile = '1' or clear = '1' then
+      if open_tile = '1' or wipe = '1' then
         base_q    <= (others => '0');
         base_slot <= (others => '0');
         stored    <= (others => '0');
       end if;
-      if clear = '1' or rst = '1' then
-        active   <= '0';
+      if wipe = '1' or rst = '1' then
+        staged_q <= '0';
         running  <= '0';
         clearing <= '1';
+        busy_q   <= '1';
         complete <= '0';
         left     <= (others => '0');
       end if;
@@ -212,7 +246,7 @@ begin
   slot       <= slot_sum - G_SLOTS when slot_sum >= G_SLOTS else slot_sum;
   w_new      <= new_q;
   w_repeated <= repeated_q;
-  commit     <= w_commit and new_q;
+  commit     <= w_commit and new_q and active;
   pair_full  <= w_valid and to_bit(byte_n = C_PAIR_BYTES - 1);
 
   p_write : process (clk)
@@ -237,7 +271,7 @@ begin
       elsif w_valid = '1' then
         byte_n <= byte_n + 1;
       end if;
-      if rst = '1' or clear = '1' or open_tile = '1' then
+      if rst = '1' or wipe = '1' or open_tile = '1' then
         check_q <= '0';
         new_q   <= '0';
       end if;
@@ -361,14 +395,14 @@ begin
         hold_last <= r_last;
       end if;
       hold_valid <= out_valid and not m_tready;
-      if rst = '1' or clear = '1' then
+      if rst = '1' or wipe = '1' then
         r_valid    <= '0';
         hold_valid <= '0';
       end if;
-      if running = '0' or rst = '1' or clear = '1' then
+      if running = '0' or rst = '1' or wipe = '1' then
         here <= '0';
       end if;
-      if rst = '1' or clear = '1' or open_tile = '1' then
+      if rst = '1' or wipe = '1' or open_tile = '1' then
         r_addr <= (others => '0');
       end if;
     end if;

@@ -150,22 +150,46 @@ architecture rtl of storage is
 begin
 
   assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
-    report "storage: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    report "storage: G_IMG_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_COLS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
-    report "storage: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    report "storage: G_IMG_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_ROWS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_PIX_W >= 1 and G_PIX_W <= 12
-    report "storage: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    report "storage: G_PIX_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PIX_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
-    report "storage: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    report "storage: G_WEIGHT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WEIGHT_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "storage: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "storage: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
   assert G_RECTIFIED = 0 or G_RECTIFIED = 1
-    report "storage: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    report "storage: G_RECTIFIED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_RECTIFIED)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
 
   load_lower <= load_row_odd and not C_RECTIFIED;

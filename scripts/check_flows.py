@@ -165,12 +165,12 @@ def check_sources(work):
 def ghdl(work, files, top, generics, label):
     folder = work / "ghdl-{}".format(label)
     folder.mkdir()
-    call(["ghdl", "-a", "--std=93c", "--workdir={}".format(folder)] + files)
+    call(["ghdl", "-a", "--std=93", "--workdir={}".format(folder)] + files)
     return folder
 
 
 def elaborate(folder, top, generics, code=0):
-    run = subprocess.run(["ghdl", "--synth", "--std=93c", "--workdir={}".format(folder), "--out=verilog", "--no-formal"]
+    run = subprocess.run(["ghdl", "--synth", "--std=93", "--workdir={}".format(folder), "--out=verilog", "--no-formal"]
                          + ["-g{}={}".format(*g) for g in sorted(generics.items())] + [top + "_pins"], cwd=str(ROOT),
                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, universal_newlines=True)
     need((run.returncode == 0) == (code == 0), "{} with {}: GHDL ends with {}\n{}".format(

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Wireshark dissector of the psweep protocol, version 1 (docs/protocol.md; constants: sw/net/protocol.hpp).
+-- Wireshark dissector of the psweep protocol, version 2 (docs/protocol.md; constants: sw/net/protocol.hpp).
 --
 --   wireshark -X lua_script:scripts/psweep.lua wire.pcap        (other ways, filters, fields: docs/wireshark.md)
 --
@@ -15,10 +15,11 @@
 local psweep = Proto("psweep", "Plane-sweep stereo over UDP")
 psweep.prefs.port = Pref.uint("UDP port", 20563, "UDP port of the chip (generic G_UDP_PORT); 0: by heuristic only")
 
-local MAGIC, VERSION, HEADER, REPLY = 0x5053, 1, 16, 0x80
+local MAGIC, VERSION, HEADER, REPLY = 0x5053, 2, 16, 0x80
 local OPEN, CLOSE, INFO, COUNTERS, STATUS, TABLE, START, WRITE, READ, RELEASE, SET = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
 local MAP = 0x8c
 local MOST_TABLE_WORDS = 364
+local LEAST_REQUEST = { [INFO] = HEADER + 128, [COUNTERS] = HEADER + 160 } -- as long as the reply
 local DOUBLED_WITHIN = 256 -- requests; sequence numbers come again after 65536
 local POSITION_ONE = 524288 -- 1 px in sfix(13,19) and ufix(2,19)
 
@@ -158,10 +159,10 @@ local counter_names = {
   "rx_frames", "rx_fcs", "rx_align", "rx_short", "rx_long", "rx_error", "rx_filtered", "rx_no_slot", "rx_overflow",
   "rx_other", "ip_header", "ip_fragment", "checksum", "arp", "icmp", "udp", "bad_message", "foreign", "tx_frames",
   "tx_collisions", "tx_late", "tx_excessive", "sessions", "timeouts", "engine_wait_rows", "engine_wait_map",
-  "chunks_repeated", "chunks_refused", "map_packets",
+  "chunks_repeated", "chunks_refused", "map_packets", "bad_source", "limited", "answers", "rx_fragment", "tx_deferred",
+  "unreachable", "recovered", "resynchronised", "rx_clock_lost", "tx_clock_lost", "tiles_failed",
 }
 for _, name in ipairs(counter_names) do field("counter_" .. name, ProtoField.uint32, "counters." .. name, name) end
-field("counter_reserved", ProtoField.uint32, "counters.reserved", "Reserved")
 
 field("map", ProtoField.bytes, "map", "Cells")
 field("map_first", ProtoField.uint32, "map.first_cell", "First cell")
@@ -177,7 +178,7 @@ local cell_fields = { f.cell, f.cell_not_local, f.cell_plane, f.cell_frac, f.cel
 psweep.fields = all_fields
 
 local expert_infos = {
-  version = { "Not version 1", expert.group.PROTOCOL, expert.severity.ERROR },
+  version = { "Not version 2", expert.group.PROTOCOL, expert.severity.ERROR },
   truncated = { "Truncated message", expert.group.MALFORMED, expert.severity.ERROR },
   cut = { "Cut off by the capture", expert.group.UNDECODED, expert.severity.NOTE },
   length = { "Wrong length", expert.group.PROTOCOL, expert.severity.WARN },
@@ -449,7 +450,21 @@ request_payload[SET] = function(m, tree)
   return string.format("register %d = %d", m.index, value)
 end
 
-for _, number in ipairs({ CLOSE, INFO, COUNTERS, STATUS }) do request_payload[number] = function() return "" end end
+for _, number in ipairs({ CLOSE, INFO, COUNTERS, STATUS }) do
+  request_payload[number] = function(m, tree)
+    local least = LEAST_REQUEST[number]
+    if least and not m.cut and m.size < least then
+      warn(m, tree, e.length, string.format("The request has to be as long as its reply, %d bytes", least))
+    end
+    return ""
+  end
+end
+
+-- OPEN, and those whom the chip does not know, get the header alone; a bad message and CLOSE may.
+local function is_bare(m)
+  if m.type == OPEN + REPLY or m.code == 1 or m.code == 2 then return true end
+  return m.whole <= HEADER and (m.code == 3 or (m.code == 0 and m.type == CLOSE + REPLY))
+end
 
 -- Chunk numbers of the set bits, as "3, 5-9", and how many.
 local function bitmap_text(m, from, bytes, first)
@@ -525,7 +540,7 @@ local function status_payload(m, tree)
 
   if not flags then return "" end
   local parts = {}
-  if not has(flags, 0) and m.code ~= 2 then parts[#parts + 1] = "no session" end
+  if not has(flags, 0) then parts[#parts + 1] = "no session" end
   if has(flags, 1) then parts[#parts + 1] = "rows " .. row_tile end
   if has(flags, 2) and engine_tile then parts[#parts + 1] = "engine " .. engine_tile end
   if has(flags, 3) and map_tile then
@@ -572,7 +587,6 @@ local function counters_payload(m, tree)
     local value = take(m, items, f["counter_" .. name], 4)
     if value and value > 0 then parts[#parts + 1] = name .. " " .. value end
   end
-  for _ = #counter_names + 1, 32 do take(m, items, f.counter_reserved, 4) end
   return table.concat(parts, ", ")
 end
 
@@ -746,7 +760,7 @@ local function dissect(tvb, pinfo, root)
   local name, text = "message", ""
   if m.type then name = type_names[m.type] or string.format("type 0x%02x", m.type) end
   if version and version ~= VERSION then
-    version_item:add_proto_expert_info(e.version, "This is version 1 of the protocol, not " .. version)
+    version_item:add_proto_expert_info(e.version, "This is version 2 of the protocol, not " .. version)
     text = "version " .. version
   end
   if m.index then
@@ -787,7 +801,7 @@ local function dissect(tvb, pinfo, root)
       text = info_payload(m, tree)
     elseif m.code == 0 and m.type == COUNTERS + REPLY then
       text = counters_payload(m, tree)
-    else
+    elseif not is_bare(m) then
       text = status_payload(m, tree)
     end
     if not m.is_request and not m.is_map then

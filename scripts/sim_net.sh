@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # The simulated chip behind the kernel's own network stack (make sim-net): in a network namespace of its own, on a TAP
 # device, psweep-sim is pinged (so the kernel's ARP works first), described, and sweeps a rendered pair in tiles through
-# `psweep depth --engine udp://ADDRESS`; the files equal those of `--engine fixed` byte for byte. Then again on a bad
-# wire. Nothing outside the namespace is touched, and it goes with this script, however that ends.
+# `psweep depth --engine udp://ADDRESS`; the files equal those of `--engine fixed` byte for byte. Then with an MTU that
+# is too small, after a host that was killed, and on a bad wire. Nothing outside the namespace is touched, and it goes
+# with this script, however that ends.
 #
 #   scripts/sim_net.sh [--psweep FILE] [--sim FILE] [--out DIR] [--config NAME] [--size N] [--planes N] [--window N]
 #                      [--seed N] [--small]
@@ -108,7 +109,7 @@ depth() {
 }
 
 echo "== scene, and its map by the bit-true model"
-rm -rf "$out/scene" "$out/fixed" "$out/chip" "$out/chip_faults"
+rm -rf "$out/scene" "$out/fixed" "$out/chip" "$out/chip_faults" "$out/chip_next" "$out"/chip_lost*
 "$psweep" render --kind rocky --seed "$seed" --size "$size" -o "$out/scene"
 depth "$out/fixed" --engine fixed
 
@@ -142,6 +143,29 @@ if command -v tshark > /dev/null; then
 else
   echo "== tshark is not installed: $out/wire.pcap is not looked at"
 fi
+
+echo "== an interface whose MTU is too small, and a host that is killed"
+start_chip "$out/chip_killed.log" --session-wall 2
+ip link set dev $device mtu 1400
+if depth "$out/chip_mtu" --engine "udp://$chip" > "$out/mtu.log" 2>&1; then
+  echo "a chip behind an MTU of 1400 gave a map"; exit 1
+fi
+grep "interface $device has an MTU of 1400" "$out/mtu.log" || { cat "$out/mtu.log"; exit 1; }
+ip link set dev $device mtu 1500
+# Not by depth(), which would be the process that is killed.
+"$psweep" depth "$out/scene/left.png" "$out/scene/right.png" --calib "$out/scene/calib.yaml" --planes "$planes" \
+  --window "$window" -q -o "$out/chip_lost" --engine "udp://$chip" &
+host_pid=$!
+for _ in $(seq 100); do
+  if "$psweep" info --json "udp://$chip" | grep -q '"session": true'; then break; fi
+done
+kill -KILL $host_pid
+wait $host_pid || true
+depth "$out/chip_next" --engine "udp://$chip"
+stop_chip
+cat "$out/chip_killed.log"
+grep -q "sessions ended for 2 s of silence: 1" "$out/chip_killed.log"
+scripts/same_output.sh "$out/fixed" "$out/chip_next"
 
 echo "== again, with 1 % of the frames lost, doubled, reordered, corrupted"
 start_chip "$out/chip_faults.log" --loss 0.01 --duplicate 0.01 --reorder 0.01 --corrupt 0.01 --corrupt-fcs 0.01

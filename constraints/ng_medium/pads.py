@@ -20,5 +20,5 @@ for _name in ["mii_txd[%d]" % i for i in range(4)] + ["mii_tx_en"]:
     PADS[_name] = dict(_OUTPUT, registered="O")
 for _name in ["mii_crs", "mii_col", "phy_full_duplex", "phy_speed_100"] + ["straps[%d]" % i for i in range(8)]:
     PADS[_name] = _INPUT
-for _name in ("led_session", "led_busy"):
+for _name in ("led_session", "led_busy", "clock_missing[0]", "clock_missing[1]"):
     PADS[_name] = _OUTPUT

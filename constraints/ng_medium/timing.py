@@ -18,7 +18,7 @@ def apply(project, top, clk_ns, pads=()):
     if top == "psweep_top":
         rx, tx = "mii_rx_clk", "mii_tx_clk"
         asynchronous = ("arst_n", "mii_crs", "mii_col", "phy_full_duplex", "phy_speed_100", "straps")
-        free_outputs = ("led_session", "led_busy")
+        free_outputs = ("led_session", "led_busy", "clock_missing")
     elif top == "arbiter":
         rx, tx = "rx_clk", "tx_clk"
         asynchronous = free_outputs = ()  # without pads

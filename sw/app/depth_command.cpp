@@ -11,6 +11,7 @@
 #include "app/run_record.hpp"
 #include "core/error.hpp"
 #include "eval/cleanup.hpp"
+#include "golden/registers.hpp"
 #include "io/image_io.hpp"
 #include "io/output_dir.hpp"
 #include "io/pfm.hpp"
@@ -96,12 +97,28 @@ ordered_json cell_counts(const DepthResult& result) {
           {"removed_by_uniqueness", bits[4]}, {"removed_as_speckle", bits[5]}};
 }
 
+// "upset 2, window 1"
+std::string repeated_errors(const net::LinkFigures& f) {
+  std::string text;
+  for (size_t bit = 0; bit < f.repeated_by_error.size(); ++bit) {
+    if (f.repeated_by_error[bit] == 0) continue;
+    text +=
+        (text.empty() ? "" : ", ") + golden::error_names(1u << bit) + " " + std::to_string(f.repeated_by_error[bit]);
+  }
+  return text.empty() ? "none" : text;
+}
+
 ordered_json link_report(const LinkRun& link) {
   const net::LinkFigures& f = link.figures;
   const net::LinkStatistics& s = link.statistics;
   const double hertz = 1e3 * link.chip.config.clk_khz;
   auto rate = [&](uint64_t bytes) { return f.seconds > 0 ? 8e-6 * static_cast<double>(bytes) / f.seconds : 0; };
   auto time = [&](uint64_t clocks) { return static_cast<double>(clocks) / hertz; };
+  ordered_json by_error = ordered_json::object();
+  for (size_t bit = 0; bit < f.repeated_by_error.size(); ++bit)
+    if (f.repeated_by_error[bit] > 0) by_error[golden::error_names(1u << bit)] = f.repeated_by_error[bit];
+  // Clocks by the chip's counters; null if it was silent at the end.
+  auto counted = [&](uint64_t clocks) { return f.counters_after.empty() ? ordered_json() : ordered_json(clocks); };
   return {{"peer", link.peer},
           {"seconds", f.seconds},
           {"up_bytes", f.pixel_bytes},
@@ -117,6 +134,10 @@ ordered_json link_report(const LinkRun& link) {
           {"foreign", s.foreign},
           {"sessions", s.sessions},
           {"timeouts", s.timeouts},
+          {"tiles_repeated", f.tiles_repeated},
+          {"tiles_repeated_by_error", by_error},
+          {"tiles_unconfirmed", f.tiles_unconfirmed},
+          {"counters_known", !f.counters_after.empty()},
           {"rtt_ms", 1e3 * s.rtt},
           {"rtt_min_ms", 1e3 * s.rtt_min},
           {"rtt_max_ms", 1e3 * s.rtt_max},
@@ -124,8 +145,8 @@ ordered_json link_report(const LinkRun& link) {
           {"engine_clocks", f.engine_clocks},
           {"engine_clocks_by_formula", link.clocks_expected},
           {"engine_seconds", time(f.engine_clocks)},
-          {"wait_rows_clocks", f.wait_rows_clocks},
-          {"wait_map_clocks", f.wait_map_clocks}};
+          {"wait_rows_clocks", counted(f.wait_rows_clocks)},
+          {"wait_map_clocks", counted(f.wait_map_clocks)}};
 }
 
 }  // namespace
@@ -271,6 +292,15 @@ void depth_command(const DepthOptions& o) {
         8e-6 * static_cast<double>(f.cell_bytes) / f.seconds, static_cast<unsigned long long>(s.lost),
         static_cast<unsigned long long>(s.resent), 1e-6 * static_cast<double>(f.engine_clocks),
         1e-6 * static_cast<double>(f.engine_clocks) / mhz, mhz);
+    if (f.tiles_repeated > 0) {
+      std::printf("tiles that failed and were sent again: %llu (engine error bits: %s)\n",
+                  static_cast<unsigned long long>(f.tiles_repeated), repeated_errors(f).c_str());
+    }
+    if (f.tiles_unconfirmed > 0) {
+      std::printf("the chip fell silent when every cell had arrived: it did not say that the last tile had no error\n");
+    } else if (f.counters_after.empty()) {
+      std::printf("the chip fell silent when every cell had arrived: its counters at the end are not known\n");
+    }
   }
   std::printf("written: %s\n", out.target().c_str());
 }

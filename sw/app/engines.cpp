@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <limits>
-#include <random>
 #include <thread>
 
 #include "core/error.hpp"
@@ -91,8 +90,7 @@ void check_chip(const std::string& where, const golden::Config& chip, const Swee
 EngineRun run_link_engine(const EngineRequest& r, const Gray& left, const Gray& right, const ProgressCall& progress) {
   const auto start = Clock::now();
   const auto transport = net::connect_udp(net::parse_endpoint("--engine", r.engine));
-  std::random_device random;
-  net::Client client(*transport, r.link_timeout, uint64_t{random()} << 32 | random());
+  net::Client client(*transport, r.link_timeout, net::fresh_seed());
   EngineRun run;
   LinkRun link;
   link.peer = transport->peer();

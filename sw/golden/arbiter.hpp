@@ -11,10 +11,13 @@
 // Bytes are exact. Time is not: the engine works in whole chunks and tiles, at clk_khz, one pixel, sample or cell a
 // clock, and map cells come all at once as far as there is room. When nothing moves any more (next_event()), the status
 // block is exact, but for tile_clocks of a tile that had to wait (clocks_exact()). Tokens are those of
-// the chip only in being new. No I/O, no errors: every payload is legal input.
+// the chip only in being new. A peer is a number that stands for MAC address, IP address and UDP port together.
+// Answers to ARP, ping and closed ports are not made here, but they take from the same buckets: allow().
+// No I/O, no errors: every payload is legal input.
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -72,10 +75,29 @@ class Arbiter {
   }
   void count(net::Counter counter) { ++counters_[counter]; }  // for the parts in front of this one: MAC and stack
 
+  // Answers to whoever asks: at most net::kBucketAnswers at once of each kind, one more each millisecond.
+  enum class Bucket { kArp, kOpen, kOther };
+  // Takes one answer from the bucket; if there is none, counts it as limited: the chip is silent.
+  bool allow(Bucket bucket) {
+    int& left = buckets_[static_cast<size_t>(bucket)];
+    if (left == 0) {
+      ++counters_[net::kLimited];
+      return false;
+    }
+    --left;
+    return true;
+  }
+  int left(Bucket bucket) const { return buckets_[static_cast<size_t>(bucket)]; }
+  // When the chip's milliseconds begin, in seconds of step()'s time, modulo a millisecond.
+  void set_tick_phase(double seconds) {
+    tick_phase_ = seconds;
+    ticks_ = tick_at(now_);
+  }
+
   // Reset of the whole chip. Tokens go on, since the real ones depend on the time.
   void power_on() {
     counters_ = {};
-    duplex_ = 0;
+    buckets_.fill(net::kBucketAnswers);
     open_ = false;
     tile_clocks_ = 0;
     clocks_exact_ = shown_exact_ = true;
@@ -96,10 +118,13 @@ class Arbiter {
       }
     }
     now_ = std::max(now_, time);
+    const int64_t tick = tick_at(now_);
+    for (int& left : buckets_) left = static_cast<int>(std::min<int64_t>(net::kBucketAnswers, left + tick - ticks_));
+    ticks_ = tick;
   }
 
   // The replies to one UDP payload: none or one. latest_code(): how it was taken, also of a message without a reply;
-  // nothing: it was none.
+  // nothing: it was none, or an answer, or an OPEN that found its bucket empty.
   std::vector<Bytes> message(const Bytes& m, uint32_t peer) {
     latest_code_.reset();
     if (m.size() < net::kHeaderBytes || net::get16(m, 0) != net::kMagic) {
@@ -113,21 +138,34 @@ class Arbiter {
     h.flags = m[10];
     h.tile = static_cast<uint16_t>(net::get16(m, 12));
     h.index = static_cast<uint16_t>(net::get16(m, 14));
+    if ((h.type & net::kReply) != 0) {
+      ++counters_[net::kAnswers];
+      return {};
+    }
+    const bool version_ok = m[2] == net::kVersion;
+    const bool authentic = open_ && version_ok && h.token == token_ && peer == peer_;
+    if (authentic) heard_ = now_;
+    const bool opens = version_ok && h.type == net::kOpen && m.size() >= net::kHeaderBytes + 4;
+    if (opens && !allow(Bucket::kOpen)) return {};
     bool silent = false;
-    const net::Code code = obey(m, h, peer, silent);
+    const net::Code code = opens ? open(m, h, peer) : obey(m, h, authentic, silent);
     latest_code_ = code;
     advance(now_);  // what became possible at once
+    if (!opens && (!authentic || h.type == net::kOpen)) {
+      if (!allow(h.type == net::kOpen ? Bucket::kOpen : Bucket::kOther)) return {};
+    }
     if (silent) return {};
     net::Header reply = h;
     reply.type = h.type | net::kReply;
     reply.flags = code;
-    if (h.type == net::kOpen && code == net::kOk) reply.token = token_;
+    if (opens && code == net::kOk) reply.token = token_;
     Bytes out = net::encode(reply);
-    if (m[2] == net::kVersion && h.type == net::kInfo) {
-      append_info(out);
-    } else if (m[2] == net::kVersion && h.type == net::kCounters) {
-      for (const uint32_t v : counters_) net::append32(out, v);
-    } else {
+    if (h.type == net::kInfo) {
+      if (code == net::kOk) append_info(out);
+    } else if (h.type == net::kCounters) {
+      if (code == net::kOk)
+        for (const uint32_t v : counters_) net::append32(out, v);
+    } else if (authentic && h.type != net::kOpen) {
       append_status(out);
     }
     return {out};
@@ -154,7 +192,7 @@ class Arbiter {
     ++counters_[net::kMapPackets];
     return out;
   }
-  uint32_t map_peer() const { return read_peer_; }
+  uint32_t map_peer() const { return peer_; }  // the session's
   std::optional<net::Code> latest_code() const { return latest_code_; }
 
   // When the engine goes on by itself, in seconds; nothing: not before another message.
@@ -185,39 +223,40 @@ class Arbiter {
  private:
   enum class Stage { kIdle, kLoad, kDrain, kSweep, kUnload };
 
+  // An OPEN of full length.
+  net::Code open(const Bytes& m, const net::Header& h, uint32_t peer) {
+    const uint32_t nonce = net::get32(m, net::kHeaderBytes);
+    if (!open_) {
+      forget();
+      open_ = true;
+      nonce_ = nonce;
+      next_token(nonce);
+      ++counters_[net::kSessions];
+    } else if (nonce != nonce_ || (peer != peer_ && h.token != token_)) {
+      ++counters_[net::kForeign];
+      return net::kBusy;
+    }
+    peer_ = peer;
+    heard_ = now_;
+    return net::kOk;
+  }
+
   // Header good; decides and does.
-  net::Code obey(const Bytes& m, const net::Header& h, uint32_t peer, bool& silent) {
+  net::Code obey(const Bytes& m, const net::Header& h, bool authentic, bool& silent) {
     const size_t body = m.size() - net::kHeaderBytes;
     auto bad = [this] {
       ++counters_[net::kBadMessages];
       return net::kBadMessage;
     };
-    if (m[2] != net::kVersion || h.type == 0 || h.type > net::kSet) return bad();
-    if (h.type == net::kInfo || h.type == net::kCounters) return net::kOk;
-    if (h.type == net::kOpen) {
-      if (body < 4) return bad();
-      const uint32_t nonce = net::get32(m, net::kHeaderBytes);
-      if (!open_) {
-        forget();
-        open_ = true;
-        nonce_ = nonce;
-        next_token();
-        heard_ = now_;
-        ++counters_[net::kSessions];
-      } else if (nonce != nonce_) {
-        ++counters_[net::kForeign];
-        return net::kBusy;
-      }
-      heard_ = now_;
-      return net::kOk;
-    }
+    if (m[2] != net::kVersion || h.type == 0 || h.type == net::kOpen || h.type > net::kSet) return bad();
+    if (h.type == net::kInfo) return m.size() < net::kInfoRequestBytes ? bad() : net::kOk;
+    if (h.type == net::kCounters) return m.size() < net::kCountersRequestBytes ? bad() : net::kOk;
     // Here a WRITE is answered even without its flag: who sends it must learn that nobody listens.
     if (!open_) return h.type == net::kClose ? net::kOk : net::kNoSession;
-    if (h.token != token_) {
+    if (!authentic) {
       ++counters_[net::kForeign];
       return net::kBusy;
     }
-    heard_ = now_;
     switch (h.type) {
       case net::kClose:
         close();
@@ -235,7 +274,6 @@ class Arbiter {
         read_tile_ = h.tile;
         read_next_ = h.index;
         read_left_ = static_cast<uint16_t>(net::get16(m, net::kHeaderBytes));
-        read_peer_ = peer;
         if (h.tile == map_tile_ && map_busy_) {
           keep_ = std::max(keep_, static_cast<uint16_t>(net::get16(m, net::kHeaderBytes + 2)));
         }
@@ -298,6 +336,10 @@ class Arbiter {
     std::array<uint32_t, net::kJobWords> words{};
     for (size_t i = 0; i < words.size(); ++i) words[i] = net::get32(m, at + 12 + 4 * i);
     if ((words[4] & 0x7ff) > table_words_.size() / 8) return net::kOrder;
+    if (chunks != (pixels + config_.chunk_pairs() - 1) / config_.chunk_pairs()) {
+      ++counters_[net::kBadMessages];
+      return net::kBadMessage;
+    }
     staged_job_ = job_from_words(words);
     ++last_tile_;
     row_busy_ = true;
@@ -490,11 +532,18 @@ class Arbiter {
     table_words_.clear();
     read_left_ = 0;
     keep_ = 0;
+    duplex_ = net::kDuplexByPin;
     engine_time_ = now_;
   }
-  void next_token() {  // 32-bit shift register with maximal period, never 0
-    for (int i = 0; i < 7; ++i) token_ = token_ << 1 | ((token_ >> 31 ^ token_ >> 21 ^ token_ >> 1 ^ token_) & 1);
+  // 32-bit shift register of maximal period that goes on from the token, with the nonce mixed in; never 0.
+  void next_token(uint32_t nonce) {
+    for (int i = 31; i >= 0; --i) {
+      const uint32_t mixed = token_ >> 31 ^ token_ >> 30 ^ token_ >> 29 ^ token_ >> 9 ^ nonce >> i;
+      token_ = token_ << 1 | (mixed & 1);
+    }
+    token_ |= 1;
   }
+  int64_t tick_at(double time) const { return static_cast<int64_t>(std::floor((time - tick_phase_) * 1e3)); }
 
   size_t chunk_cells() const { return static_cast<size_t>(config_.chunk_cells()); }
   size_t largest() const { return static_cast<size_t>(config_.engine.plane_cols) * config_.engine.plane_rows; }
@@ -575,7 +624,10 @@ class Arbiter {
   double rows_wait_ = 0, map_wait_ = 0;  // parts of 256 clocks
   // Session
   bool open_ = false;
-  uint32_t token_ = 0, nonce_ = 0;
+  uint32_t token_ = 0, nonce_ = 0, peer_ = 0;
+  std::array<int, 3> buckets_{};
+  double tick_phase_ = 0;
+  int64_t ticks_ = 0;
   uint8_t duplex_ = 0;
   uint16_t last_tile_ = 0, map_tile_ = 0, table_id_ = 0;
   std::vector<uint32_t> table_words_;
@@ -602,7 +654,6 @@ class Arbiter {
   uint16_t keep_ = 0;  // the largest one of a READ for this map
   // The READ in force
   uint16_t read_tile_ = 0, read_next_ = 0, read_left_ = 0, read_sequence_ = 0;
-  uint32_t read_peer_ = 0;
   std::optional<net::Code> latest_code_;
 };
 

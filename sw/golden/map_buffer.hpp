@@ -31,6 +31,10 @@ class MapBuffer {
   void keep(int chunk) {
     if (busy() && !whole()) kept_ = std::max(kept_, chunk);
   }
+  // The launched tile has failed.
+  void fail() {
+    if (!complete_) forget();
+  }
   void forget() {
     cells_.clear();
     complete_ = false;

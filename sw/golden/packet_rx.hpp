@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bit-true model of entity packet_rx: a frame and the MAC's verdict -> pulses of the counters, and the message if it is
-// one. Standards: RFC 826 (ARP), 791 (IPv4), 792 (ICMP), 768 (UDP), 1071 (sums). Events: docs/protocol.md, counters
-// 0..15.
+// one. Standards: RFC 826 (ARP), 791 (IPv4), 792 (ICMP), 768 (UDP), 1071 (sums), 1122 (sources, broadcasts), 5227 (ARP
+// probes). Events: docs/protocol.md, counters 0..15, then those below.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -12,18 +12,23 @@
 
 namespace psweep::golden {
 
-enum class MessageKind { kArp = 0, kIcmp = 1, kUdp = 2 };
+// kClosed: UDP to another port. For packet_tx it is the answer to that: ICMP port unreachable.
+enum class MessageKind { kArp = 0, kIcmp = 1, kUdp = 2, kClosed = 3 };
+
+// Bits of the events behind the counters 0..15.
+constexpr int kEventBadSource = 16, kEventFragment = 17, kEventResynchronised = 18;  // the last one: not of a frame
+constexpr int kReceiveEvents = 19;
 
 // Frames wait in a ring of such pieces, 4 * G_SLOTS of them.
 constexpr size_t kGranule = 512;
 
 struct Message {
   MessageKind kind{};
-  int length = 0;  // ICMP: from frame byte 34 to the end of the IP packet; UDP: payload; ARP: 0
+  int length = 0;  // ICMP: from frame byte 34 to the end of the IP packet; UDP, closed: payload; ARP: 0
 };
 
 struct Received {
-  uint16_t events = 0;
+  uint32_t events = 0;
   std::optional<Message> message;
 };
 
@@ -41,10 +46,13 @@ class PacketRx {
  public:
   PacketRx(const net::Address& own, const net::Bytes& frame) : own_(own), f_(frame) {}
 
-  Received receive(uint8_t verdict, bool room) const {
-    Received r;
-    for (const VerdictBit v : kVerdictOrder)
-      if (verdict >> v.bit & 1) return counted(v.counter);
+  Received receive(uint8_t verdict, bool room, bool half_duplex = false) const {
+    for (const VerdictBit v : kVerdictOrder) {
+      if (!(verdict >> v.bit & 1)) continue;
+      // A short frame with a wrong FCS is what a collision leaves behind.
+      const bool fragment = v.counter == net::kRxShort && half_duplex && (verdict & 1);
+      return counted(fragment ? kEventFragment : v.counter);
+    }
     if (!for_us()) return counted(net::kRxFiltered);
     const Received good = arp() ? judge_arp() : judge_ip();
     if (good.message && !room) return counted(net::kRxNoSlot);
@@ -54,13 +62,14 @@ class PacketRx {
  private:
   static Received counted(int counter) {
     Received r;
-    r.events = static_cast<uint16_t>(1 << counter);
+    r.events = 1u << counter;
     return r;
   }
   static Received accepted(MessageKind kind, size_t length) {
     Received r;
     r.message = Message{kind, static_cast<int>(length)};
-    r.events = static_cast<uint16_t>(1 << net::kRxFrames | 1 << (net::kArp + static_cast<int>(kind)));
+    const int counter = kind == MessageKind::kClosed ? net::kRxOther : net::kArp + static_cast<int>(kind);
+    r.events = 1u << net::kRxFrames | 1u << counter;
     return r;
   }
 
@@ -79,13 +88,26 @@ class PacketRx {
       mine = mine && is(i, own_.mac[i]);
       all = all && is(i, 0xff);
     }
-    return mine || all;
+    return mine || (all && arp());  // RFC 1122, 3.3.6: IP in a broadcast frame is for a broadcast address, or wrong
+  }
+  bool is_own_mac(size_t at) const {
+    for (size_t i = 0; i < 6; ++i)
+      if (f_[at + i] != own_.mac[i]) return false;
+    return true;
+  }
+  // Of a frame that has all these bytes.
+  bool bad_source() const {
+    if ((f_[6] & 1) || is_own_mac(6)) return true;
+    if (arp()) return (f_[22] & 1) || is_own_mac(22) || net::get32(f_, 28) == own_.ip;
+    const uint8_t net = f_[26];
+    return net == 0 || net == 127 || net >= 224 || net::get32(f_, 26) == own_.ip;
   }
   bool arp() const { return f_.size() > 13 && (f_[13] & 2); }
 
   Received judge_arp() const {
     if (!are(12, {0x08, 0x06}) || !are(14, {0, 1, 8, 0, 6, 4, 0, 1}) || !is_own_ip(38)) return counted(net::kRxOther);
     if (f_.size() < 46) return counted(net::kIpHeader);  // no mac_rx lets that pass
+    if (bad_source()) return counted(kEventBadSource);
     return accepted(MessageKind::kArp, 0);
   }
 
@@ -95,6 +117,7 @@ class PacketRx {
     const size_t total = net::get16(f_, 16);
     if (total < 28 || 14 + total + 4 > f_.size() || !is_own_ip(30)) return counted(net::kIpHeader);
     if (net::ones_sum(f_.data() + 14, 20) != 0xffff) return counted(net::kIpHeader);
+    if (bad_source()) return counted(kEventBadSource);
     if ((net::get16(f_, 20) & 0x3fff) != 0) return counted(net::kIpFragment);
     const uint8_t protocol = f_[23];
     const size_t length = total - 20;
@@ -104,11 +127,11 @@ class PacketRx {
       if (net::ones_sum(content, length) != 0xffff) return counted(net::kChecksum);
       return accepted(MessageKind::kIcmp, length);
     }
-    if (protocol != net::kProtocolUdp || net::get16(f_, 36) != own_.port) return counted(net::kRxOther);
+    if (protocol != net::kProtocolUdp) return counted(net::kRxOther);
     if (net::get16(f_, 38) != length) return counted(net::kChecksum);
     const uint32_t pseudo = net::pseudo_header_sum(net::get32(f_, 26), net::get32(f_, 30), protocol, length);
     if (net::get16(f_, 40) != 0 && net::ones_sum(content, length, pseudo) != 0xffff) return counted(net::kChecksum);
-    return accepted(MessageKind::kUdp, length - 8);
+    return accepted(net::get16(f_, 36) == own_.port ? MessageKind::kUdp : MessageKind::kClosed, length - 8);
   }
 
   net::Address own_;

@@ -17,7 +17,8 @@ inline net::Bytes peer_bytes(const net::Address& peer) {
   return b;
 }
 
-// own.port is G_UDP_PORT. payload: ICMP: from frame byte 38 on, UDP: from 42 on; 1 .. 1472 bytes; ARP: none.
+// own.port is G_UDP_PORT. payload: ICMP: from frame byte 38 on, UDP: from 42 on; 1 .. 1472 bytes; ARP: none. kClosed:
+// ICMP port unreachable, whose payload is four zeros and the beginning of the packet that it is about.
 inline net::Bytes transmit(MessageKind kind, const net::Address& own, const net::Address& peer,
                            const net::Bytes& payload) {
   net::Bytes f(42, 0);
@@ -62,6 +63,7 @@ inline net::Bytes transmit(MessageKind kind, const net::Address& own, const net:
     const uint32_t sum = checksum(26, f.size(), 17 + total - 20);
     net::put16(f, 40, sum == 0 ? 0xffff : sum);
   } else {
+    if (kind == MessageKind::kClosed) net::put16(f, 34, 0x0303);
     net::put16(f, 36, checksum(34, f.size(), 0));
   }
   return f;

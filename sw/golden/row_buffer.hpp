@@ -25,6 +25,10 @@ class RowBuffer {
     there_.clear();
     pairs_.clear();
   }
+  // The launched tile has failed; rows_left: not all of its pairs have been taken.
+  void fail(bool rows_left) {
+    if (rows_left) clear();
+  }
   void open_tile(uint32_t pixels, int chunks) {
     clear();
     open_ = true;

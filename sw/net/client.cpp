@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "net/client.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <exception>
+#include <random>
 
 namespace psweep::net {
 namespace {
@@ -11,6 +16,11 @@ namespace {
 constexpr double kFirstPatience = 0.03;  // before anything was measured
 constexpr double kMostPatience = 0.5;    // so that a cable put back is noticed soon (or 4 round trips)
 constexpr double kBusyPause = 0.25;      // between two OPEN at a busy chip
+constexpr double kBrief = 1;             // seconds, or so many round trips:
+constexpr double kBriefTrips = 8;
+constexpr int kMostGone = 8;      // sessions that are gone before their first status
+constexpr int kMostRefusals = 3;  // of INFO or COUNTERS: the request may have been damaged on its way
+constexpr size_t kIpUdpHeaders = 28;
 
 std::string seconds(double s) {
   char text[32];
@@ -104,6 +114,23 @@ std::optional<Status> parse_status(const std::vector<uint32_t>& w) {
   return s;
 }
 
+uint64_t fresh_seed() {
+  uint64_t seed = 0;
+  try {
+    std::random_device random;
+    seed = uint64_t{random()} << 32 | random();
+  } catch (const std::exception&) {  // no source: the rest must do
+  }
+  auto mix = [&seed](uint64_t v) {
+    seed = (seed ^ v) * 0x9e3779b97f4a7c15;
+    seed ^= seed >> 29;
+  };
+  mix(static_cast<uint64_t>(std::chrono::system_clock::now().time_since_epoch().count()));
+  mix(static_cast<uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count()));
+  mix(static_cast<uint64_t>(::getpid()));
+  return seed;
+}
+
 Client::Client(Transport& transport, double timeout, uint64_t seed)
     : transport_(transport), timeout_(timeout), random_state_(seed), sent_(65536) {
   sequence_ = static_cast<uint16_t>(random());
@@ -132,7 +159,34 @@ void Client::check_silence(const std::string& outstanding) {
   if (silent <= timeout_) return;
   std::string text = where() + ": no valid answer for " + seconds(silent) + "; outstanding: " + outstanding;
   if (!transport_.complaint().empty()) text += " (" + transport_.complaint() + ")";
+  if (other_versions_ > 0) text += "; answers came in version " + std::to_string(other_version_) + " of the protocol";
+  // Small packets may get through when large ones do not.
+  const std::string cut = now() - latest_ <= timeout_ ? fragments() : "";
+  if (!cut.empty()) text += "; " + cut;
   throw LinkError(text);
+}
+
+void Client::check_version() {
+  // One such packet may be a damaged one.
+  if (ever_heard_ || other_versions_ < 2) return;
+  throw LinkError(where() + ": the chip speaks version " + std::to_string(other_version_) +
+                  " of the protocol, this host version " + std::to_string(kVersion) + ": " +
+                  (other_version_ < kVersion ? "the chip needs newer contents, or this host an older program"
+                                             : "this host needs a newer program"));
+}
+
+std::string Client::fragments() noexcept {
+  try {
+    if (first_counters_.empty() || brief_) return {};
+    const uint32_t before = first_counters_[kIpFragment];
+    uint32_t count = 0;
+    briefly([&] { count = counters()[kIpFragment] - before; });
+    if (count == 0) return {};
+    return "the chip has received " + std::to_string(count) +
+           " fragments (ip_fragment), which it does not take: something on the way has an MTU that is too small";
+  } catch (...) {
+    return {};
+  }
 }
 
 uint64_t Client::send(Type type, uint16_t tile, uint16_t index, const Bytes& payload, uint8_t flags) {
@@ -140,8 +194,8 @@ uint64_t Client::send(Type type, uint16_t tile, uint16_t index, const Bytes& pay
   s = Sent{};
   s.order = ++order_;
   s.type = type;
-  // Those that need no session carry no token, so that their replies are recognised after it has changed.
-  s.token = type == kOpen || type == kInfo || type == kCounters ? 0 : token_;
+  // INFO and COUNTERS need no token, but a host that shows one is answered while others are limited.
+  s.token = type == kOpen && !moving_ ? 0 : token_;
   s.tile = tile;
   s.index = index;
   s.count = type == kRead && payload.size() >= 2 ? static_cast<uint16_t>(get16(payload, 0)) : 0;
@@ -155,10 +209,17 @@ uint64_t Client::send(Type type, uint16_t tile, uint16_t index, const Bytes& pay
   h.index = index;
   Bytes packet = encode(h);
   packet.resize(kHeaderBytes + payload.size());
+  // No answer is longer than its question.
+  if (type == kInfo) packet.resize(std::max(packet.size(), kInfoRequestBytes));
+  if (type == kCounters) packet.resize(std::max(packet.size(), kCountersRequestBytes));
   std::copy(payload.begin(), payload.end(), packet.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes));
   ++statistics_.packets_sent;
   statistics_.bytes_sent += packet.size();
   transport_.send(packet);
+  if (const auto most = transport_.largest(); most && packet.size() > most->payload) {
+    throw LinkError(where() + ": " + most->why + ", but this " + type_name(type) + " needs " +
+                    std::to_string(packet.size() + kIpUdpHeaders));
+  }
   return s.order;
 }
 
@@ -178,6 +239,7 @@ std::optional<Event> Client::take(const Bytes& packet) {
   statistics_.bytes_received += packet.size();
   const auto h = decode(packet);
   if (!h || (h->type & kReply) == 0) {
+    if (!h) take_other_version(packet);
     ++statistics_.malformed;
     return std::nullopt;
   }
@@ -205,8 +267,15 @@ std::optional<Event> Client::take(const Bytes& packet) {
     return std::nullopt;
   }
   r.words = words_of(packet);
+  const bool bare = r.words.empty();
   bool good;
-  if (sent.type == kInfo) {
+  if (sent.type == kOpen) {
+    good = bare && r.code <= kBadMessage && r.code != kNoSession;
+  } else if (r.code == kBusy || r.code == kNoSession) {
+    good = bare;  // to somebody whom the chip does not know
+  } else if (bare) {
+    good = r.code == kBadMessage || (sent.type == kClose && r.code == kOk);
+  } else if (sent.type == kInfo) {
     good = r.code == kOk && parse_info(r.words).has_value();
   } else if (sent.type == kCounters) {
     good = r.code == kOk && r.words.size() == kCounterWords;
@@ -236,9 +305,22 @@ std::optional<Event> Client::take(const Bytes& packet) {
     statistics_.rtt_min = std::min(statistics_.rtt_min, trip);
     statistics_.rtt_max = std::max(statistics_.rtt_max, trip);
   }
-  heard_ = now();
+  heard_ = latest_ = now();
+  ever_heard_ = true;
   backoff_ = 1;
   return r;
+}
+
+// A chip refuses what is not of its version in a header of its own: the rest of it answers a request of ours.
+void Client::take_other_version(const Bytes& p) {
+  if (p.size() < kHeaderBytes || get16(p, 0) != kMagic || p[2] == kVersion || p[10] != kBadMessage) return;
+  const Sent& sent = sent_[get16(p, 8)];
+  if (sent.order == 0 || p[3] != (sent.type | kReply) || get32(p, 4) != sent.token || get16(p, 12) != sent.tile ||
+      get16(p, 14) != sent.index) {
+    return;
+  }
+  other_version_ = p[2];
+  ++other_versions_;
 }
 
 std::optional<Event> Client::take_map(const Bytes& packet, const Header& h, Sent& sent) {
@@ -276,6 +358,7 @@ Reply Client::request(Type type, uint16_t tile, uint16_t index, const Bytes& pay
       }
     }
     silence();
+    check_version();
     // Packets that answer something else do not count here, or a chip that answers all but this would hold us for ever.
     if (now() - asked_ > timeout_) {
       heard_ = std::min(heard_, asked_);
@@ -285,12 +368,29 @@ Reply Client::request(Type type, uint16_t tile, uint16_t index, const Bytes& pay
 }
 
 Capabilities Client::info() {
-  const auto c = parse_info(request(kInfo).words);
+  Reply r = request(kInfo);
+  for (int i = 1; r.code != kOk && i < kMostRefusals; ++i) r = request(kInfo);
+  if (r.code != kOk) throw LinkError(where() + ": INFO was refused: " + code_name(r.code));
+  const auto c = parse_info(r.words);
   capabilities_ = *c;  // take() has checked
+  // Both ways: what goes up is sent from here, and what comes down must fit as well.
+  const ArbiterConfig& a = c->config;
+  const size_t largest =
+      kHeaderBytes + static_cast<size_t>(std::max(a.chunk_pairs() * a.pair_bytes(), a.chunk_cells() * a.cell_bytes()));
+  if (const auto most = transport_.largest(); most && largest > most->payload) {
+    throw LinkError(where() + ": " + most->why + ", but packets of this chip need " +
+                    std::to_string(largest + kIpUdpHeaders));
+  }
   return *c;
 }
 
-std::vector<uint32_t> Client::counters() { return request(kCounters).words; }
+std::vector<uint32_t> Client::counters() {
+  Reply r = request(kCounters);
+  for (int i = 1; r.code != kOk && i < kMostRefusals; ++i) r = request(kCounters);
+  if (r.code != kOk) throw LinkError(where() + ": COUNTERS was refused: " + code_name(r.code));
+  if (first_counters_.empty()) first_counters_ = r.words;
+  return r.words;
+}
 
 Status Client::open(const Capabilities& c) {
   capabilities_ = c;
@@ -298,13 +398,20 @@ Status Client::open(const Capabilities& c) {
   nonce_ = static_cast<uint32_t>(random());
   Bytes nonce;
   append32(nonce, nonce_);
-  const double start = now(), patient = 1.1e-3 * c.config.session_ms + 1;
-  for (;;) {
+  const double start = now(), patient = std::max(1.1e-3 * c.config.session_ms + 1, timeout_);
+  for (int gone = 0;;) {
     const Reply r = request(kOpen, 0, 0, nonce);
     if (r.code == kOk) {
       token_ = r.token;
-      ++statistics_.sessions;
-      return *r.status;
+      const Reply s = request(kStatus);
+      if (s.status && s.code == kOk) {
+        ++statistics_.sessions;
+        return *s.status;
+      }
+      // It is gone already: the chip was reset, or that was not its answer.
+      token_ = 0;
+      if (++gone >= kMostGone) throw LinkError(where() + ": STATUS was refused: " + code_name(s.code));
+      continue;
     }
     if (r.code != kBusy) throw LinkError(where() + ": OPEN was refused: " + code_name(r.code));
     if (now() - start > patient) {
@@ -316,18 +423,44 @@ Status Client::open(const Capabilities& c) {
   }
 }
 
+// From another address than the one that opened the session: nonce and token show whose it is.
+bool Client::move() {
+  Bytes nonce;
+  append32(nonce, nonce_);
+  moving_ = true;
+  uint8_t code = kBusy;
+  try {
+    code = request(kOpen, 0, 0, nonce).code;
+  } catch (...) {
+    moving_ = false;
+    throw;
+  }
+  moving_ = false;
+  return code == kOk;
+}
+
+bool Client::briefly(const std::function<void()>& call) noexcept {
+  const double patient = timeout_;
+  const bool outer = brief_;
+  bool good = true;
+  timeout_ = std::min(timeout_, std::max(kBrief, kBriefTrips * rtt()));
+  brief_ = true;
+  try {
+    call();
+  } catch (...) {
+    good = false;
+  }
+  brief_ = outer;
+  timeout_ = patient;
+  return good;
+}
+
 void Client::close() noexcept {
   if (token_ == 0) return;
-  try {
-    const double patient = timeout_;
-    timeout_ = std::min(timeout_, 1.0);  // the results are there already
-    try {
-      request(kClose);
-    } catch (const LinkError&) {  // the chip's silence timer does it, too
-    }
-    timeout_ = patient;
-  } catch (...) {
-  }
+  // If that fails the chip's silence timer does it, too.
+  briefly([this] {
+    if (request(kClose).code == kBusy && move()) request(kClose);
+  });
   token_ = 0;
 }
 

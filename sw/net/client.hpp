@@ -3,7 +3,8 @@
 // packet that comes back, measures round trips (Jacobson's estimator, RFC 6298), repeats what was not answered.
 // A packet is believed only if it answers a request of this client in this session: sequence, type, token, tile and
 // index agree and the length is exact. Everything else is counted and dropped, whatever it holds.
-// Errors: LinkError with host, port, what was asked and for how long.
+// Errors: LinkError with host, port, what was asked and for how long; at once if the chip speaks another version of the
+// protocol, or if its packets do not fit into what the network carries in one piece.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -75,9 +76,9 @@ struct Reply {
   uint8_t code = 0;
   uint16_t tile = 0, index = 0;
   uint32_t token = 0;
-  uint64_t order = 0;  // number of the request, counted from 1 over the client's life
-  std::optional<Status> status;
-  std::vector<uint32_t> words;  // INFO, COUNTERS
+  uint64_t order = 0;            // number of the request, counted from 1 over the client's life
+  std::optional<Status> status;  // nothing: a bare header, as OPEN and refusals have it
+  std::vector<uint32_t> words;   // INFO, COUNTERS
 };
 struct MapChunk {
   uint16_t tile = 0, index = 0;
@@ -86,19 +87,29 @@ struct MapChunk {
 };
 using Event = std::variant<Reply, MapChunk>;
 
+// For Client: from std::random_device and the time, so that a machine where one of them is no good has the other.
+uint64_t fresh_seed();
+
 class Client {
  public:
-  // timeout: seconds without any valid packet after which it gives up.
+  // timeout: seconds without any valid packet after which it gives up. seed: sequence numbers and nonces; who draws it
+  // badly makes his own token easier to guess, nobody else's.
   Client(Transport& transport, double timeout, uint64_t seed);
 
   // Stop and wait: repeats until answered; other packets that come in between are dropped.
   Reply request(Type type, uint16_t tile = 0, uint16_t index = 0, const Bytes& payload = {}, uint8_t flags = 0);
   Capabilities info();
   std::vector<uint32_t> counters();
-  // Opens a session. A busy chip is asked again, for as long as an older session of ours would need to time out.
+  // Opens a session and asks for its status. A busy chip is asked again, for as long as an older session of ours would
+  // need to time out, and for the timeout at least.
   Status open(const Capabilities& c);
-  // Ends it; says nothing if the chip is gone.
+  // Ends it; says nothing if the chip is gone. If this host has got another address meanwhile, the session moves first.
   void close() noexcept;
+  // With a timeout of a second (more where round trips are long); false if that was too short. For goodbyes.
+  bool briefly(const std::function<void()>& call) noexcept;
+  // The chip has counted fragments since the first counters() of this client: the words for it, else empty. Asks
+  // briefly.
+  std::string fragments() noexcept;
 
   // Event-driven: numbers and sends; returns its order.
   uint64_t send(Type type, uint16_t tile = 0, uint16_t index = 0, const Bytes& payload = {}, uint8_t flags = 0);
@@ -133,17 +144,25 @@ class Client {
     double time = 0;
   };
   std::optional<Event> take_map(const Bytes& packet, const Header& h, Sent& sent);
+  void take_other_version(const Bytes& packet);
+  void check_version();
+  bool move();
   uint64_t random();
 
   Transport& transport_;
   double timeout_;
   uint64_t random_state_;
   uint32_t token_ = 0, nonce_ = 0;
+  bool moving_ = false;
   std::optional<Capabilities> capabilities_;
   uint16_t sequence_ = 0;
   uint64_t order_ = 0;
-  std::vector<Sent> sent_;  // by sequence
-  double heard_ = 0, asked_ = 0;
+  std::vector<Sent> sent_;        // by sequence
+  double heard_ = 0, asked_ = 0;  // heard_: of what is asked now; latest_: of anything
+  double latest_ = 0;
+  bool ever_heard_ = false, brief_ = false;
+  int other_version_ = 0, other_versions_ = 0;  // the latest, and how many packets
+  std::vector<uint32_t> first_counters_;
   bool has_rtt_ = false;
   double rtt_variation_ = 0, backoff_ = 1, least_patience_ = 0.004;
   LinkStatistics statistics_;

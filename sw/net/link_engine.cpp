@@ -5,6 +5,7 @@
 #include <array>
 #include <deque>
 #include <map>
+#include <optional>
 
 #include "golden/registers.hpp"
 
@@ -20,6 +21,8 @@ constexpr int kMostRefusals = 64;       // of one session, beyond what reorderin
 constexpr int kMostNowhere = 8;         // status blocks in a row without a trace of a started tile
 constexpr int kMostStill = 64;          // status blocks in a row in which nothing moves, and no tile is swept
 constexpr int kMostFruitlessOpens = 8;  // sessions in a row that brought no tile
+constexpr int kMostTableRefusals = 4;   // of a plane table
+constexpr int kMostTries = 3;           // of one tile
 
 class Pump {
  public:
@@ -41,27 +44,26 @@ class Pump {
     const double begin = client_.now();
     figures_.counters_before = client_.counters();
     begin_session(false);
-    while (wanted_ < count_ || (releasing_ && !lost_session_)) {
-      if (lost_session_) {
-        begin_session(true);
-        continue;
-      }
-      act();
-      const double now = client_.now();
-      const auto event = client_.receive(std::max(0.0, next_timer() - now));
-      if (event) {
-        if (const auto* reply = std::get_if<Reply>(&*event)) {
-          on_reply(*reply);
-        } else {
-          on_map(std::get<MapChunk>(*event));
+    try {
+      while (wanted_ < count_) {
+        if (lost_session_) {
+          keep_finished();
+          begin_session(true);
+          continue;
         }
+        turn();
       }
-      on_timer();
-      if (client_.silent_for() > client_.timeout()) client_.check_silence(outstanding());
+    } catch (const LinkError&) {
+      keep_finished();
+      if (!finished_) throw;
+      ++figures_.tiles_unconfirmed;
+      give(wanted_, std::move(*finished_));
     }
+    // Nothing of what follows is needed for the map.
     client_.close();
-    figures_.counters_after = client_.counters();
+    client_.briefly([this] { figures_.counters_after = client_.counters(); });
     auto clocks = [&](Counter counter) {
+      if (figures_.counters_after.empty()) return uint64_t{0};
       return uint64_t{figures_.counters_after[counter] - figures_.counters_before[counter]} * 256;
     };
     figures_.wait_rows_clocks = clocks(kEngineWaitRows);
@@ -107,14 +109,39 @@ class Pump {
   // Between two questions while the chip is busy with something long.
   double pause() const { return std::clamp(2 * client_.rtt(), kLeastPause, kMostPause); }
 
+  void turn() {
+    act();
+    const double now = client_.now();
+    const auto event = client_.receive(std::max(0.0, next_timer() - now));
+    if (event) {
+      if (const auto* reply = std::get_if<Reply>(&*event)) {
+        on_reply(*reply);
+      } else {
+        on_map(std::get<MapChunk>(*event));
+      }
+    }
+    on_timer();
+    if (client_.silent_for() > client_.timeout()) client_.check_silence(outstanding());
+  }
+
+  // The last tile's map, when all of it is there, only not the chip's word that nothing went wrong: better than none.
+  void keep_finished() {
+    const auto it = downloads_.find(wanted_);
+    if (suspect_ || wanted_ != count_ - 1 || it == downloads_.end()) return;
+    if (it->second.known == it->second.there.size()) finished_ = std::move(it->second);
+    downloads_.erase(it);
+  }
+
   void begin_session(bool again) {
-    lost_session_ = false;
+    lost_session_ = suspect_ = false;
     if (again) {
       if (wanted_ == wanted_at_open_ && ++fruitless_ > kMostFruitlessOpens) {
         throw LinkError(client_.where() + ": the session was lost " + std::to_string(fruitless_) +
                         " times without one tile in between");
       }
       if (wanted_ != wanted_at_open_) fruitless_ = 0;
+      const std::string cut = fruitless_ > 0 ? client_.fragments() : "";
+      if (!cut.empty()) throw LinkError(client_.where() + ": the session brought nothing: " + cut);
       if (!same_capabilities(client_.info().config, c_)) {
         throw LinkError(client_.where() + ": came back as a chip with other capabilities");
       }
@@ -277,7 +304,7 @@ class Pump {
 
   // What comes back ------------------------------------------------------------------------------------------------
   void on_reply(const Reply& r) {
-    if (!r.status || r.type == kOpen || r.type == kTable || r.type == kClose) return;
+    if (r.type == kOpen || r.type == kTable || r.type == kClose || r.type == kInfo || r.type == kCounters) return;
     if (r.order <= session_order_) return;  // about an older session
     const bool newest = r.order > answered_;
     if (newest) answered_ = r.order;
@@ -292,8 +319,9 @@ class Pump {
       }
       return;
     }
+    if (!r.status) return;
     const Status& s = *r.status;
-    check_status(s);
+    if (!good_status(s)) return;
     if (r.type == kStart && start_ && upload_active_ && r.tile == upload_.number && !upload_.started) {
       on_start(r);
     } else if (r.type == kRead && read_ && r.order == read_.order) {
@@ -329,24 +357,36 @@ class Pump {
     }
   }
 
-  void check_status(const Status& s) {
-    if (!s.has(kFlagSession)) return;
-    auto what = [&] {
-      return " (engine error bits: " + golden::error_names(s.errors) + "; " + std::to_string(s.window_errors) +
-             " samples outside the loaded window)";
-    };
+  // False if a tile has failed: it comes again in a new session, whose table is written anew as well.
+  bool good_status(const Status& s) {
+    if (!s.has(kFlagSession)) return true;
     if (s.has(kFlagFailed)) {
-      throw LinkError(client_.where() + ": tile " + std::to_string(tile_of(s.failed_tile)) +
-                      ": refused or dropped by the engine" + what());
+      on_failure(s, tile_of(s.failed_tile), ": refused or dropped by the engine");
+      return false;
     }
     if (s.error_count < error_count_) {  // cleared since
       error_count_ = s.error_count;
       errors_ = s.errors;
     }
     if (s.error_count > error_count_ || (s.errors & ~errors_) != 0) {
-      throw LinkError(client_.where() + ": tile " + std::to_string(tile_of(s.engine_tile)) +
-                      " or the one before it is wrong" + what());
+      on_failure(s, tile_of(s.engine_tile), " or the one before it is wrong");
+      return false;
     }
+    return true;
+  }
+
+  void on_failure(const Status& s, int tile, const std::string& what) {
+    suspect_ = true;
+    finished_.reset();
+    if (++tries_[tile] >= kMostTries) {
+      throw LinkError(client_.where() + ": tile " + std::to_string(tile) + what +
+                      " (engine error bits: " + golden::error_names(s.errors) + "; " + std::to_string(s.window_errors) +
+                      " samples outside the loaded window), " + std::to_string(kMostTries) + " times");
+    }
+    ++figures_.tiles_repeated;
+    for (size_t bit = 0; bit < figures_.repeated_by_error.size(); ++bit)
+      figures_.repeated_by_error[bit] += s.errors >> bit & 1;
+    lost_session_ = true;
   }
 
   void on_status(const Status& s, uint64_t order) {
@@ -462,17 +502,23 @@ class Pump {
 
   void finish() {
     const int tile = wanted_;
-    Download& d = downloads_.at(tile);
-    cells_done_ += d.cells.size();
-    cells_in_work_ = 0;
-    figures_.pixel_bytes += golden::load_clocks(d.job) * c_.pair_bytes();
-    output_(tile, std::move(d.cells));
+    Download d = std::move(downloads_.at(tile));
     downloads_.erase(tile);
-    ++wanted_;
+    give(tile, std::move(d));
     reading_ = false;
     read_ = Pending{};
+    if (wanted_ == count_) return;  // CLOSE forgets the last map
     release_tile_ = tile;
     send_release();
+  }
+
+  void give(int tile, Download d) {
+    cells_done_ += d.cells.size();
+    cells_in_work_ = 0;
+    progress_(cells_done_);
+    figures_.pixel_bytes += golden::load_clocks(d.job) * c_.pair_bytes();
+    output_(tile, std::move(d.cells));
+    ++wanted_;
   }
 
   std::string outstanding() const {
@@ -506,8 +552,10 @@ class Pump {
   // Tiles: wanted_ <= next_; below wanted_ all received, below next_ all started. first_ is tile 0 of the session.
   int wanted_ = 0, next_ = 0, first_ = 0;
   int wanted_at_open_ = 0, fruitless_ = 0, refusals_ = 0, nowhere_ = 0, still_ = 0;
-  std::array<uint32_t, 8> look_{};  // of the latest status block
-  bool lost_session_ = false;
+  std::array<uint32_t, 8> look_{};               // of the latest status block
+  bool lost_session_ = false, suspect_ = false;  // suspect_: an error of the engine has come up
+  std::map<int, int> tries_;                     // of tiles that failed
+  std::optional<Download> finished_;
   bool half_duplex_ = false;
   unsigned errors_ = 0, error_count_ = 0;  // at OPEN
   uint64_t cells_done_ = 0, cells_in_work_ = 0;
@@ -592,6 +640,7 @@ bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
   const auto writes = golden::table_writes(table);
   const size_t per = static_cast<size_t>(c.chunk_bytes) / 4;
   const double start = client.now();
+  int refused = 0;
   for (size_t first = 0; first < writes.size(); first += per) {
     Bytes payload;
     for (size_t i = first; i < std::min(first + per, writes.size()); ++i) append32(payload, writes[i].value);
@@ -599,6 +648,8 @@ bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
       const Reply r = client.request(kTable, 1, static_cast<uint16_t>(first), payload);
       if (r.code == kOk) break;
       if (r.code == kBusy || r.code == kNoSession) return false;
+      // It may have been damaged on its way.
+      if (r.code == kBadMessage && ++refused < kMostTableRefusals) continue;
       // The engine may need a moment to drop what an older session left.
       if (r.code != kNotReady || client.now() - start > client.timeout()) {
         throw LinkError(client.where() + ": the plane table was refused: " + code_name(r.code));

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tiles over the link: sends windows, starts tiles, collects maps, with several tiles in work at once. Survives loss,
 // repetition, reordering and corruption of any packet, a pulled cable (shorter than the client's timeout) and a chip
-// that forgot its session or was reset; docs/host.md says how.
-// Errors: LinkError if the chip falls silent, drops a tile or reports samples outside the loaded window.
+// that forgot its session or was reset, and tiles that the engine dropped; docs/host.md says how.
+// Errors: LinkError if the chip falls silent before every cell has arrived, or if one tile fails three times: dropped,
+// refused, or with samples outside the loaded window.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -28,7 +30,12 @@ struct LinkFigures {
   double seconds = 0;                        // from before the session to after it
   uint64_t engine_clocks = 0;                // sum of the chip's tile_clocks
   uint64_t wait_rows_clocks = 0, wait_map_clocks = 0;
-  std::vector<uint32_t> counters_before, counters_after;
+  // Tiles that failed and were sent again; how often each of the engine's error bits was the reason.
+  uint64_t tiles_repeated = 0;
+  std::array<uint64_t, 8> repeated_by_error{};
+  // Tiles, one at most, whose cells had all arrived when the chip fell silent before it said that no error came up.
+  int tiles_unconfirmed = 0;
+  std::vector<uint32_t> counters_before, counters_after;  // after: empty if the chip was silent by then
 };
 
 // Payloads. Exposed for tests and the link's benchmark.

@@ -16,7 +16,7 @@ using Bytes = std::vector<uint8_t>;
 
 constexpr uint16_t kUdpPort = 20563;
 constexpr uint16_t kMagic = 0x5053;
-constexpr uint8_t kVersion = 1;
+constexpr uint8_t kVersion = 2;
 constexpr size_t kHeaderBytes = 16;
 constexpr uint8_t kReply = 0x80;
 constexpr uint8_t kFlagAnswer = 1;  // of WRITE
@@ -46,7 +46,14 @@ constexpr uint16_t kJobRegisters[kJobWords] = {0x01, 0x02, 0x03, 0x04, 0x05, 0x0
 constexpr int kStartBytes = 12 + 4 * kJobWords;
 constexpr int kStatusWords = 9;  // without the bitmap
 constexpr int kInfoWords = 32;
-constexpr int kCounterWords = 32;
+constexpr int kCounterWords = 40;
+// INFO and COUNTERS must be as long as their answers, filled up with zeros, so that no answer is longer than its
+// request.
+constexpr size_t kInfoRequestBytes = kHeaderBytes + size_t{4} * kInfoWords;
+constexpr size_t kCountersRequestBytes = kHeaderBytes + size_t{4} * kCounterWords;
+// Unauthenticated messages: three buckets of so many answers (OPEN, ARP, everything else), refilled by one a
+// millisecond.
+constexpr int kBucketAnswers = 15;
 
 enum StatusFlag : uint16_t {
   kFlagSession = 1 << 0,
@@ -89,13 +96,24 @@ enum Counter : int {
   kChunksRepeated,
   kChunksRefused,
   kMapPackets,
+  kBadSource,
+  kLimited,
+  kAnswers,
+  kRxFragment,
+  kTxDeferred,
+  kUnreachable,
+  kRecovered,
+  kResynchronised,
+  kRxClockLost,
+  kTxClockLost,
+  kTilesFailed,
 };
 
 // What a tile takes longer in the chip than engine_clocks(): the row buffer's first pair comes 3 clocks after the
 // start, the engine could take it after two.
 constexpr uint64_t kFirstPairClocks = 1;
 
-// Names of the counters in their order; nullptr behind the last.
+// Names of the counters in their order.
 constexpr const char* kCounterNames[kCounterWords] = {"rx_frames",
                                                       "rx_fcs",
                                                       "rx_align",
@@ -125,9 +143,17 @@ constexpr const char* kCounterNames[kCounterWords] = {"rx_frames",
                                                       "chunks_repeated",
                                                       "chunks_refused",
                                                       "map_packets",
-                                                      nullptr,
-                                                      nullptr,
-                                                      nullptr};
+                                                      "bad_source",
+                                                      "limited",
+                                                      "answers",
+                                                      "rx_fragment",
+                                                      "tx_deferred",
+                                                      "unreachable",
+                                                      "recovered",
+                                                      "resynchronised",
+                                                      "rx_clock_lost",
+                                                      "tx_clock_lost",
+                                                      "tiles_failed"};
 
 // Generics of the arbiter; sizes that follow from them and from the engine's.
 struct ArbiterConfig {

@@ -9,6 +9,12 @@
 
 namespace psweep::net {
 
+// The largest payload that goes out in one packet, and what sets it: "interface eth0 has an MTU of 1400".
+struct Largest {
+  size_t payload = 0;
+  std::string why;
+};
+
 class Transport {
  public:
   virtual ~Transport() = default;
@@ -20,6 +26,8 @@ class Transport {
   virtual double now() = 0;
   // For messages: "192.168.1.80:20563".
   virtual std::string peer() const = 0;
+  // Nothing: no limit that matters is known.
+  virtual std::optional<Largest> largest() const { return std::nullopt; }
   // What the system last said about lost packets ("connection refused"), or empty.
   virtual std::string complaint() const { return {}; }
 };

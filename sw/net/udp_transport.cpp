@@ -2,9 +2,12 @@
 #include "net/udp_transport.hpp"
 
 #include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -21,6 +24,7 @@ namespace {
 
 // A map of the largest tiles, so that nothing is lost while this process does not run.
 constexpr int kReceiveBuffer = 4 << 20;
+constexpr size_t kIpUdpHeaders = 28;
 
 class UdpTransport : public Transport {
  public:
@@ -47,6 +51,10 @@ class UdpTransport : public Transport {
     }
     // As much as the system allows; a smaller one costs repetitions, nothing else.
     setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &kReceiveBuffer, sizeof kReceiveBuffer);
+    // The chip takes no fragments: a packet that does not fit is to be refused here, or on its way, and told.
+    const int never_fragment = IP_PMTUDISC_DO;
+    setsockopt(socket_, IPPROTO_IP, IP_MTU_DISCOVER, &never_fragment, sizeof never_fragment);
+    find_largest();
   }
   ~UdpTransport() override { ::close(socket_); }
   UdpTransport(const UdpTransport&) = delete;
@@ -54,7 +62,7 @@ class UdpTransport : public Transport {
 
   void send(const Bytes& m) override {
     // A full queue or a missing route is a lost packet: the client repeats it.
-    if (::send(socket_, m.data(), m.size(), 0) < 0) complaint_ = std::strerror(errno);
+    if (::send(socket_, m.data(), m.size(), 0) < 0) complain(errno);
   }
   std::optional<Bytes> receive(double timeout_s) override {
     const double until = now() + timeout_s;
@@ -66,7 +74,7 @@ class UdpTransport : public Transport {
         m.resize(static_cast<size_t>(got));
         return m;
       }
-      if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) complaint_ = std::strerror(errno);
+      if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR) complain(errno);
       const double left = until - now();
       if (left <= 0) return std::nullopt;
       pollfd waiting{socket_, POLLIN, 0};
@@ -76,10 +84,48 @@ class UdpTransport : public Transport {
   double now() override { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
   std::string peer() const override { return peer_; }
   std::string complaint() const override { return complaint_; }
+  std::optional<Largest> largest() const override { return largest_; }
 
  private:
+  void complain(int code) {
+    complaint_ = std::strerror(code);
+    if (code == EMSGSIZE) find_largest();
+  }
+  // MTU of the path as far as the kernel knows it; at first that of the interface.
+  void find_largest() {
+    int path = 0;
+    socklen_t size = sizeof path;
+    if (::getsockopt(socket_, IPPROTO_IP, IP_MTU, &path, &size) != 0 || path < static_cast<int>(kIpUdpHeaders)) return;
+    Largest l;
+    l.payload = static_cast<size_t>(path) - kIpUdpHeaders;
+    const std::string name = interface();
+    ifreq request{};
+    name.copy(request.ifr_name, sizeof request.ifr_name - 1);
+    const bool of_interface = !name.empty() && ::ioctl(socket_, SIOCGIFMTU, &request) == 0 && request.ifr_mtu <= path;
+    l.why = of_interface ? "interface " + name + " has an MTU of " + std::to_string(path)
+                         : "the way to the chip has an MTU of " + std::to_string(path);
+    largest_ = l;
+  }
+  // The one that has this socket's address, or nothing.
+  std::string interface() const {
+    sockaddr_in own{};
+    socklen_t size = sizeof own;
+    ifaddrs* all = nullptr;
+    if (::getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size) != 0 || ::getifaddrs(&all) != 0) return {};
+    std::string name;
+    for (const ifaddrs* i = all; i != nullptr && name.empty(); i = i->ifa_next) {
+      if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
+      sockaddr_in address{};
+      std::memcpy(&address, i->ifa_addr, sizeof address);
+      if (address.sin_addr.s_addr == own.sin_addr.s_addr) name = i->ifa_name;
+    }
+    ::freeifaddrs(all);
+    return name;
+  }
+
   int socket_ = -1;
   std::string peer_, complaint_;
+  std::optional<Largest> largest_;
   std::chrono::steady_clock::time_point start_;
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Transport over a connected UDP/IPv4 socket: packets of other senders do not come through. No privileges needed.
+// Transport over a connected UDP/IPv4 socket: packets of other senders do not come through, and none is fragmented.
+// No privileges needed.
 #pragma once
 #include <memory>
 #include <string>

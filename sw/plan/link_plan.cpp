@@ -225,16 +225,19 @@ class Simulation {
     respond();
   }
 
-  // One thing at a time: a message, or between messages a map packet.
+  // One thing at a time: a message, or between messages a map packet. After an answer it is the turn of a chunk that is
+  // there, even if it has to wait for the transmitter.
   void respond() {
     if (responding_) return;
-    if (!inbox_.empty()) {
+    const bool map_due =
+        reading_left_ > 0 && map_tile_ == reading_tile_ && reading_next_ < finished_ && reading_next_ >= kept_;
+    if (!inbox_.empty() && !(map_turn_ && map_due)) {
       responding_ = true;
       const Message m = inbox_.front();
       const bool rows = m.type == net::kWrite;
       agenda_.after(clk(kHeaderClocks + (rows ? c_.chunk_bytes : 0)), [this, m] { obey(m); });
-    } else if (frames_ < 2 && reading_left_ > 0 && map_tile_ == reading_tile_ && reading_next_ < finished_ &&
-               reading_next_ >= kept_) {
+    } else if (map_due && frames_ < 2) {
+      map_turn_ = false;
       responding_ = true;
       ++frames_;
       const int tile = map_tile_;
@@ -314,6 +317,7 @@ class Simulation {
       const int rest = kReplyByteClocks * (payload - kBaseByte) + kFrameClocks;
       agenda_.after(clk(static_cast<uint64_t>(rest)), [this, a, payload] {
         transmit(payload, [this, a] { on_answer(a); });
+        map_turn_ = true;
         message_done();
       });
     });
@@ -562,7 +566,7 @@ class Simulation {
 
   // responder and packet_tx
   std::deque<Message> inbox_;
-  bool responding_ = false;
+  bool responding_ = false, map_turn_ = false;
   int frames_ = 0;  // in the making, waiting or on the wire; there are two places
   std::function<void()> blocked_;
   int reading_tile_ = -1;

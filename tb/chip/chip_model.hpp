@@ -46,8 +46,9 @@ class ChipModel {
   // One rising edge of the transmit clock; what the pins showed before it.
   virtual MiiSample tx_edge(Time at) = 0;
 
-  virtual bool session() const = 0;  // led_session
-  virtual bool busy() const = 0;     // led_busy
+  virtual bool session() const = 0;                     // led_session
+  virtual bool busy() const = 0;                        // led_busy
+  virtual unsigned clock_missing() const { return 0; }  // bit 0 receive clock, 1 transmit clock
   // Since power-on: tiles launched (start commands on dbg_cfg), clocks with led_busy.
   virtual int64_t launches() const = 0;
   virtual int64_t busy_clocks() const = 0;

@@ -14,6 +14,7 @@ LinkSettings link_settings(const DeskSettings& s) {
   LinkSettings link;
   link.half_duplex = s.half_duplex;
   link.delay = s.medium_delay;
+  link.echo = s.half_duplex ? s.echo : -1;
   link.seed = s.seed;
   return link;
 }
@@ -51,6 +52,7 @@ void Desk::reset_chip(Time duration) {
   run_for(std::max(duration, 10 * std::max(rx_period_, clk_period_)));
   chip_->set_reset(false);
   in_reset_ = false;
+  released_ = clocks_;
   // Released in step with each clock, and memories that clear themselves have had their time.
   run_for(std::max(10 * rx_period_, 2000 * clk_period_));
 }
@@ -78,7 +80,7 @@ void Desk::run_to(Time end) {
     } else {
       tx_edge();
     }
-    const bool carrier = link_.carrier(), collision = link_.collision();
+    const bool carrier = held_ || link_.carrier(), collision = link_.collision();
     if (carrier != carrier_ || collision != collision_) {
       carrier_ = carrier;
       collision_ = collision;
@@ -107,13 +109,13 @@ void Desk::rx_edge() {
       if (on_frame) on_frame(frame);
     }
   }
-  if (mii_clocks_) chip_->rx_edge(link_.rx_clock(), now_);
+  if (mii_clocks_ && rx_clock_) chip_->rx_edge(link_.rx_clock(), now_);
   if (wave_ && wave_->tile >= 0 && chip_->launches() > wave_->tile) open_wave();
 }
 
 void Desk::tx_edge() {
   next_tx_ += tx_period_;
-  if (!mii_clocks_) return;
+  if (!mii_clocks_ || !tx_clock_) return;
   const MiiSample from_chip = chip_->tx_edge(now_);
   // A PHY is reset together with the chip, whose outputs say nothing before the first edge that resets them.
   link_.tx_clock(in_reset_ || tx_unknown_ ? MiiSample{} : from_chip);
@@ -143,6 +145,7 @@ void Desk::frame_ends(bool from_chip, bool good, const net::Bytes& frame) {
       recorded_.pop_front();
     }
   }
+  if (on_wire && good && net::fcs_good(frame)) on_wire(from_chip, net::Bytes(frame.begin(), frame.end() - 4));
   if (from_chip && good && plugged_) {
     net::Bytes bare(frame.begin(), frame.end() - 4);
     from_chip_.put(std::move(bare), now_);

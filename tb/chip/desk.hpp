@@ -29,6 +29,7 @@ struct DeskSettings {
   double clk_phase = 0.13, rx_phase = 0.37, tx_phase = 0.71;
   bool mii_clocks = true;    // they run from power-on
   bool half_duplex = false;  // pin and medium
+  int echo = -1;             // half duplex: nibble times after which the PHY loops the chip's frames back; -1: never
   int medium_delay = 10;     // nibble times each way, half duplex: 40 of the 128 of a slot would be the longest
   uint8_t straps = 0;
   uint32_t seed = 1;
@@ -48,6 +49,8 @@ class Desk {
   Desk(std::unique_ptr<ChipModel> chip, const DeskSettings& settings);
 
   std::function<void(const net::Bytes& frame)> on_frame;  // from the chip, behind the faults, whole and without FCS
+  // Every good frame at the chip's pins as it ends, without FCS: no faults and no cable in between.
+  std::function<void(bool from_chip, const net::Bytes& frame)> on_wire;
 
   void send(net::Bytes frame) { to_chip_.put(std::move(frame), now_); }
   // Straight to the pins, no faults, FCS as it is.
@@ -70,6 +73,17 @@ class Desk {
   void set_cable(bool plugged) { plugged_ = plugged; }
   // Both clocks of the PHY stand still, as some do without a link or in their reset; what is on the wire waits.
   void set_mii_clocks(bool running) { mii_clocks_ = running; }
+  // One of them alone.
+  void set_rx_clock(bool running) { rx_clock_ = running; }
+  void set_tx_clock(bool running) { tx_clock_ = running; }
+  // Pin arst_n alone goes low for a while; nothing else knows.
+  void pulse_reset(Time duration) {
+    chip_->set_reset(true);
+    run_for(duration);
+    chip_->set_reset(false);
+  }
+  // Pin crs stays high, whatever is on the wire.
+  void hold_carrier(bool held) { held_ = held; }
   void set_faults(const FaultRates& rates) {
     to_chip_.set_rates(rates);
     from_chip_.set_rates(rates);
@@ -77,6 +91,7 @@ class Desk {
 
   Time now() const { return now_; }
   int64_t clocks() const { return clocks_; }
+  int64_t released() const { return released_; }  // clocks() when the latest reset ended
   double clk_mhz() const { return settings_.clk_mhz; }
   // Nothing happens until somebody sends: wire and engine are at rest, no session, no frame held back by faults.
   bool idle() const;
@@ -116,8 +131,9 @@ class Desk {
   Time clk_period_, rx_period_, tx_period_;
   Time next_clk_, next_rx_, next_tx_;
   Time active_ = 0;  // when something happened last
-  int64_t clocks_ = 0;
-  bool plugged_ = true, in_reset_ = false, tx_unknown_ = true, mii_clocks_;
+  int64_t clocks_ = 0, released_ = 0;
+  bool plugged_ = true, in_reset_ = false, tx_unknown_ = true, mii_clocks_, rx_clock_ = true, tx_clock_ = true;
+  bool held_ = false;
   bool carrier_ = false, collision_ = false;
 
   std::unique_ptr<PcapWriter> pcap_;

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// link_speed: how busy the link keeps the engine, and how long a whole pair takes, in simulated time (make link-speed).
-// The chip 'tile' (256 x 130 cells, double buffers) sweeps the first tiles of the paper's pair, 1120 x 1120 pixels and
-// 301 planes, sent by the host library over the in-process link at 100 Mbit/s in full duplex.
+// link_speed: the link's goodput, how busy it keeps the engine, and how long a whole pair takes, in simulated time
+// (make link-speed). The chip 'tile' (256 x 130 cells, double buffers) sweeps the first tiles of the paper's pair, 1120
+// x 1120 pixels and 301 planes, sent by the host library over the in-process link at 100 Mbit/s in full duplex.
 //   busy       the tiles' clocks without any stall (golden/control.hpp), over those from the first launch to the last
 //              map beat. What is left: waiting for rows, for the map buffer, and for the scheduler
 //   whole pair begin and end as measured; the tiles in between by their own clocks and the stalls measured per tile
+//   goodput    as psweep bench-link measures it, and counted at the chip's pins; 5 % apart at most
 // Usage: link_speed [tiles] [in flight]; default 3 tiles, and 1 and 2 in flight. Exit code 1 if a tile differs from the
-// model or the link broke.
+// model, the link broke, or bench-link is wrong.
 #include <chrono>
 #include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
 
+#include "chip/goodput.hpp"
 #include "chip/watched.hpp"
 #include "fast/fast.hpp"
 #include "golden/psweep.hpp"
@@ -26,6 +28,29 @@ const net::Address kHost{{0x02, 0x00, 0x00, 0x00, 0x00, 0x01}, 0x0a050001, 40000
 constexpr int kSize = 1120, kPlanes = 301;
 
 double ms(Time t) { return 1e-12 * static_cast<double>(t); }
+
+bool link_goodput() {
+  constexpr double kSeconds = 0.02;  // each
+  const Chip& chip = chip_named("tile");
+  Desk desk(chip.make(), {});
+  Station station(desk, kHost, chip.address.ip, chip.address.port);
+  ChipTransport transport(station, chip.address);
+  net::Client client(transport, 5.0, 1);
+  net::LinkBench bench(client, client.info());
+  bool good = true;
+  struct {
+    const char* name;
+    bool up, down;
+  } const kinds[] = {{"up alone", true, false}, {"down alone", false, true}, {"both at once", true, true}};
+  for (const auto& k : kinds) {
+    const Goodput g = goodput(desk, chip.address.port, bench, k.up, k.down, kSeconds);
+    std::printf("goodput, %-12s  up %6.2f Mbit/s, at the pins %6.2f; down %6.2f, at the pins %6.2f\n", k.name,
+                g.bench.up, g.wire_up, g.bench.down, g.wire_down);
+    good = good && g.worst() < 0.05;
+  }
+  client.close();
+  return good;
+}
 
 bool measure(const SweepSetup& setup, const Scene& scene, const Plan& plan, int tiles, int in_flight) {
   const Chip& chip = chip_named("tile");
@@ -139,7 +164,7 @@ int run(int argc, char** argv) {
   std::printf("%dx%d, %d planes in %zu tiles of up to %dx%d cells; 100 Mbit/s full duplex, %g MHz\n", kSize, kSize,
               kPlanes, plan.tiles.size(), size.cols, size.rows, chip_named("tile").config.clk_khz / 1000.0);
   forecast(setup, plan);
-  bool good = true;
+  bool good = link_goodput();
   for (const int in_flight : {1, 2})
     if (only == 0 || only == in_flight) good = measure(setup, scene, plan, tiles, in_flight) && good;
   return good ? 0 : 1;

@@ -92,7 +92,12 @@ MiiSample MiiLink::rx_clock() {
     chip_collided_ = true;
     return {static_cast<uint8_t>(random_() & 15), true, false};
   }
-  // A PHY does not loop the chip's own frame back.
+  if (settings_.echo >= 0 && !at_chip_.valid && echo_.size() > static_cast<size_t>(settings_.echo)) {
+    const MiiSample own = echo_.front();
+    echo_.pop_front();
+    return own;
+  }
+  // Most PHYs do not loop the chip's own frame back.
   return at_chip_;
 }
 
@@ -110,6 +115,10 @@ void MiiLink::tx_clock(const MiiSample& from_chip) {
   if (!chip_sends_ && chip_backs_off_) {
     ++chip_idle_;
     if (chip_idle_ > 1024 * kSlot + 4 * kSlot) chip_backs_off_ = false;  // it has given up
+  }
+  if (settings_.echo >= 0) {
+    echo_.push_back(from_chip);
+    while (echo_.size() > static_cast<size_t>(settings_.echo) + 2) echo_.pop_front();
   }
   heard_.push_back(from_chip);
   const auto delay = static_cast<size_t>(settings_.half_duplex ? settings_.delay : 0);

@@ -6,7 +6,8 @@
 //   low nibble first, FCS, gap of at least 24 nibbles; whatever differs is counted.
 //   Half duplex: one medium with `delay` nibbles of propagation each way. The station defers to the carrier, jams 32
 //   bits at a collision, backs off by 0 .. 2^min(n,10)-1 slots of 512 bit times, gives up after 16 attempts, and
-//   counts a collision after 512 bit times as late (such a frame is lost). While both send, the chip receives noise.
+//   counts a collision after 512 bit times as late (such a frame is lost). While both send, the chip receives noise; a
+//   PHY may loop the chip's own frames back. What the station has sent of a frame that collides arrives as a fragment.
 // Everything is counted in nibble times, so 10 and 100 Mbit/s are alike.
 #pragma once
 #include <deque>
@@ -22,6 +23,7 @@ struct LinkSettings {
   bool half_duplex = false;
   int delay = 0;  // nibbles each way; only half duplex notices
   int gap = 24;   // nibbles; the standard's minimum
+  int echo = -1;  // the PHY loops the chip's frames back, so many nibbles later (10BASE-T, half duplex); negative: not
   uint32_t seed = 1;
 };
 
@@ -83,6 +85,7 @@ class MiiLink {
 
   // the medium
   std::deque<MiiSample> to_chip_, heard_;
+  std::deque<MiiSample> echo_;
   MiiSample at_chip_;
   bool chip_sends_ = false, chip_collided_ = false, chip_backs_off_ = false;
   int chip_idle_ = 1 << 20;

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "chip/chip_transport.hpp"
+#include "chip/session_watch.hpp"
 #include "chip/tap.hpp"
 #include "core/error.hpp"
 #include "net/protocol.hpp"
@@ -26,7 +27,7 @@ struct Options {
   std::string config = "tiny", tap, pcap;
   WaveWindow wave;
   DeskSettings desk;
-  double clk_mhz = 0, seconds = 0;
+  double clk_mhz = 0, seconds = 0, session_wall = 0;
   int straps = 0;
   bool ten = false, quiet = false, list = false;
 };
@@ -43,7 +44,11 @@ net::Bytes message(uint8_t type, uint16_t sequence) {
   net::Header h;
   h.type = type;
   h.sequence = sequence;
-  return net::encode(h);
+  net::Bytes m = net::encode(h);
+  // As long as the answer.
+  if (type == net::kInfo) m.resize(net::kInfoRequestBytes);
+  if (type == net::kCounters) m.resize(net::kCountersRequestBytes);
+  return m;
 }
 
 // Words of the reply to INFO or COUNTERS; empty if none came. Asks again a few times, as faults may be switched on.
@@ -72,7 +77,7 @@ void print_counters(Desk& desk, const net::Address& chip) {
   }
   std::printf("the chip's counters (these questions included):");
   for (size_t i = 0; i < words.size() && i < size_t{net::kCounterWords}; ++i)
-    if (net::kCounterNames[i] && words[i] != 0) std::printf(" %s %" PRIu32, net::kCounterNames[i], words[i]);
+    if (words[i] != 0) std::printf(" %s %" PRIu32, net::kCounterNames[i], words[i]);
   std::printf("\n");
 }
 
@@ -128,14 +133,18 @@ void print_start(const Chip& chip, const net::Address& a, const Options& o) {
 }
 
 // Seconds of computing, sleep not counted.
-double serve(Desk& desk, Tap& tap, const Options& o, uint64_t& refused) {
+double serve(Desk& desk, Tap& tap, const net::Address& chip, const Options& o, uint64_t& refused) {
   // So many frames wait at the chip's side of the cable; the rest wait in the kernel's queue.
   constexpr size_t kAhead = 8;
   const auto begin = Clock::now();
   double slept = 0;
-  desk.on_frame = [&](const net::Bytes& frame) { refused += !tap.write(frame); };
+  SessionWatch session(desk, chip, o.session_wall);
+  desk.on_frame = [&](const net::Bytes& frame) {
+    if (o.session_wall <= 0 || !SessionWatch::answer(frame)) refused += !tap.write(frame);
+  };
   while (!stopped) {
     if (o.seconds > 0 && seconds_since(begin) >= o.seconds) break;
+    session.look(seconds_since(begin));
     while (desk.waiting() < kAhead) {
       auto frame = tap.read();
       if (!frame) break;
@@ -155,6 +164,8 @@ double serve(Desk& desk, Tap& tap, const Options& o, uint64_t& refused) {
     slept += seconds_since(asleep);
   }
   desk.on_frame = nullptr;
+  if (session.ended() > 0 && !o.quiet)
+    std::printf("sessions ended for %g s of silence: %" PRIu64 "\n", o.session_wall, session.ended());
   return seconds_since(begin) - slept;
 }
 
@@ -223,7 +234,7 @@ int run(Options& o) {
   bool good = true;
   uint64_t refused = 0;
   if (tap) {
-    running = serve(desk, *tap, o, refused);
+    running = serve(desk, *tap, address, o, refused);
   } else {
     good = self_test(desk, address);
     running = seconds_since(begin);
@@ -247,6 +258,10 @@ int main_function(int argc, char** argv) {
   app.add_flag("--list", o.list, "Lists the chips in this program and ends");
   app.add_option("--tap", o.tap, "TAP device to plug the cable into; without it: self-test, then end");
   app.add_option("--for", o.seconds, "End after so many seconds of wall time")->check(CLI::Range(0.1, 1e9));
+  app.add_option("--session-wall", o.session_wall,
+                 "End a session whose host has been silent for so many seconds of wall time (default: the chip's own "
+                 "timer alone, in simulated time)")
+      ->check(CLI::Range(0.5, 1e9));
   app.add_option("--pcap", o.pcap, "Record the wire at the chip's pins for Wireshark (simulated time)");
   auto* wave = app.add_option("--wave", o.wave.file, "Record waves (FST) for GTKWave or Surfer; default: frame 1");
   auto* frame = app.add_option("--wave-frame", o.wave.frame, "Waves begin with this frame, from 1, both directions")

@@ -4,7 +4,8 @@
 //   Frames  : messages that a good host would send next, chosen by the model's state, so that tiles go all the way;
 //             among them messages of every type that are wrong in that state: without session, with another's token,
 //             old and future tiles, hostile fields, rows of the tile in work once more with other content; ARP, ping,
-//             fragments, IP options, bursts beyond the room for waiting frames. Then damage: cut, lengthened, bits
+//             fragments, IP options, bursts beyond the room for waiting frames, more unauthenticated messages than are
+//             answered, sessions that move to another host. Then damage: cut, lengthened, bits
 //             flipped with and without a right FCS, lengths and offsets overwritten, odd nibbles, rx_er, other
 //             addresses
 //   Number  : PSWEEP_FUZZ_FRAMES (2000) per configuration; PSWEEP_FUZZ_PROGRESS=1: a line on stderr now and then;
@@ -22,7 +23,8 @@
 //             in 256 clocks) have a tolerance of 10 and 2 more per begin or end of waiting: the model does not know
 //             how long a message takes inside
 //   Time    : frames come while the engine is at rest, held up or in the middle of a sweep; the model's clock is the
-//             chip's
+//             chip's. No frame is decided on in the clocks around a millisecond's tick, in which the answers that are
+//             left may be one more or less
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -89,18 +91,20 @@ constexpr const char* kClasses[] = {
     "frame: rx_filtered", "frame: rx_other", "frame: ip_header", "frame: ip_fragment", "frame: checksum", "frame: arp",
     "frame: icmp", "frame: udp", "burst: answered", "burst: no room",
     // Type and code.
-    "OPEN ok", "OPEN busy", "OPEN bad message", "CLOSE ok", "CLOSE busy", "INFO ok", "COUNTERS ok", "STATUS ok",
-    "STATUS no session", "STATUS busy", "TABLE ok", "TABLE no session", "TABLE busy", "TABLE bad message",
-    "TABLE order", "TABLE not ready", "START ok", "START no session", "START busy", "START bad message", "START order",
-    "START not ready", "WRITE ok", "WRITE no session", "WRITE busy", "WRITE bad message", "WRITE order",
-    "WRITE not ready", "READ ok", "READ no session", "READ busy", "READ bad message", "RELEASE ok",
-    "RELEASE no session", "RELEASE busy", "RELEASE order", "SET ok", "SET no session", "SET busy", "SET bad message",
+    "OPEN ok", "OPEN busy", "OPEN bad message", "CLOSE ok", "CLOSE busy", "INFO ok", "INFO bad message", "COUNTERS ok",
+    "COUNTERS bad message", "STATUS ok", "STATUS no session", "STATUS busy", "TABLE ok", "TABLE no session",
+    "TABLE busy", "TABLE bad message", "TABLE order", "TABLE not ready", "START ok", "START no session", "START busy",
+    "START bad message", "START order", "START not ready", "WRITE ok", "WRITE no session", "WRITE busy",
+    "WRITE bad message", "WRITE order", "WRITE not ready", "READ ok", "READ no session", "READ busy",
+    "READ bad message", "RELEASE ok", "RELEASE no session", "RELEASE busy", "RELEASE order", "SET ok", "SET no session",
+    "SET busy", "SET bad message",
     // In particular.
-    "no message", "unknown type", "other version", "OPEN again", "CLOSE without a session", "CLOSE in a sweep",
-    "CLOSE while the map waits", "START again", "WRITE unanswered", "WRITE again", "WRITE beyond the slots",
-    "WRITE of a tile that was taken", "READ before its map", "READ that keeps", "RELEASE again", "map packet",
-    "message in a sweep", "tile done", "tile refused", "tile too short", "tile too long", "samples outside the window",
-    "table beyond the engine's"};
+    "no message", "unknown type", "other version", "answer", "limited", "OPEN limited", "OPEN moves the session",
+    "STATUS with the token from elsewhere", "START with other chunks", "OPEN again", "CLOSE without a session",
+    "CLOSE in a sweep", "CLOSE while the map waits", "START again", "WRITE unanswered", "WRITE again",
+    "WRITE beyond the slots", "WRITE of a tile that was taken", "READ before its map", "READ that keeps",
+    "RELEASE again", "map packet", "message in a sweep", "tile done", "tile refused", "tile too short", "tile too long",
+    "samples outside the window", "table beyond the engine's"};
 
 class Fuzz {
  public:
@@ -121,6 +125,7 @@ class Fuzz {
     uint64_t mac = 0;
     for (const uint8_t b : own_.mac) mac = mac << 8 | b;
     model_.set_mac(mac);
+    model_.set_tick_phase((static_cast<double>(desk_->released()) + 5) * 1e-3 / config_.clk_khz);
     for (int i = 0; i < 3; ++i) {
       const auto n = static_cast<uint8_t>(i + 1);
       hosts_[i] = {{2, 0, 0, 0, 0, n}, 0x0a050000u + 10 * n, static_cast<uint16_t>(40000 + i)};
@@ -237,6 +242,38 @@ class Fuzz {
     compare();
   }
 
+  // Clocks that are short of the next tick by `before` or past one by `after` are passed, where the model and the chip
+  // might not agree on what is left of the answers.
+  void avoid_tick(double from, double to) {
+    const double ms = config_.clk_khz, phase = static_cast<double>(desk_->released()) + 5;
+    const double now = static_cast<double>(desk_->clocks());
+    const double first = std::ceil((now + from - phase) / ms) * ms + phase;  // tick at or after `from`
+    if (first <= now + to) run_clocks(first - (now + from) + 1);
+  }
+  // Waits for answers that are allowed again.
+  void need(golden::Arbiter::Bucket bucket, int count = 1) {
+    if (model_.left(bucket) >= count) return;
+    linger_ = false;
+    rest();
+    while (model_.left(bucket) < count) {
+      run_clocks(config_.clk_khz / 4.0);
+      dirty_ = true;
+      step();
+    }
+    rest();
+  }
+  // Who has the session.
+  int speaker() const {
+    if (!model_.session_open()) return 0;
+    const net::Address& peer = peers_[model_.map_peer()];
+    for (int i = 0; i < 3; ++i)
+      if (equal(hosts_[static_cast<size_t>(i)], peer)) return i;
+    return 0;
+  }
+  static bool equal(const net::Address& a, const net::Address& b) {
+    return a.mac == b.mac && a.ip == b.ip && a.port == b.port;
+  }
+
   // Frames ------------------------------------------------------------------------------------------------------------
   void transmit(Bytes frame, int64_t cut, int64_t bad) {
     mangler_->cut = cut;
@@ -246,10 +283,13 @@ class Fuzz {
     const size_t bytes = frame.size();
     // The responder does not look at what is behind the message.
     const size_t message = bytes > 18 ? std::min<size_t>(bytes, 14 + net::get16(frame, 16)) : bytes;
+    const double wire = static_cast<double>(bytes + 8 + 14) * 80 * kNanosecond / static_cast<double>(clk_);
+    const double inside = static_cast<double>(message) + 250;  // header and rows pass through the responder
+    avoid_tick(wire - 300, wire + inside + 300);
     desk_->send_raw(std::move(frame));
     desk_->run_for(static_cast<Time>(bytes + 8 + 14) * 80 * kNanosecond);
     while (desk_->waiting() != 0) desk_->run_for(kMicrosecond);
-    run_clocks(static_cast<double>(message) + 150);  // header and rows pass through the responder
+    run_clocks(inside);
   }
   // Frame without FCS -> chip and models.
   void put(Bytes frame, bool fcs_wrong = false, int64_t cut = INT64_MAX, int64_t bad = -1, bool pad = true) {
@@ -263,7 +303,7 @@ class Fuzz {
     // On the wire, in the responder, and its reply: of a ping as long, of a READ some map packets.
     const bool udp = frame.size() > 46 && frame[23] == net::kProtocolUdp;
     const bool read = udp && frame[45] == net::kRead;
-    rest((udp ? 3.5 : 12.5) * static_cast<double>(frame.size()) + (read ? 6.0 * 4 * config_.chunk_bytes : 0.0) + 1200);
+    rest((udp ? 3.5 : 12.5) * static_cast<double>(frame.size()) + (read ? 6.0 * 4 * config_.chunk_bytes : 0.0) + 4500);
     latest_.clear();
     transmit(std::move(frame), cut, bad);
     step();
@@ -287,10 +327,14 @@ class Fuzz {
     const Bytes& f = frame.bytes;
     const auto length = static_cast<std::ptrdiff_t>(r.message->length);
     net::Address peer;
-    std::copy(f.begin() + 6, f.begin() + 12, peer.mac.begin());
-    peer.ip = net::get32(f, r.message->kind == golden::MessageKind::kArp ? 28 : 26);
+    const bool arp = r.message->kind == golden::MessageKind::kArp;
+    std::copy(f.begin() + (arp ? 22 : 6), f.begin() + (arp ? 28 : 12), peer.mac.begin());
+    peer.ip = net::get32(f, arp ? 28 : 26);
     peer.port = static_cast<uint16_t>(net::get16(f, 34));
-    if (r.message->kind == golden::MessageKind::kArp) {
+    using Bucket = golden::Arbiter::Bucket;
+    if (r.message->kind != golden::MessageKind::kUdp && !model_.allow(arp ? Bucket::kArp : Bucket::kOther)) {
+      seen("limited");
+    } else if (arp) {
       expected_.push_back({golden::transmit(r.message->kind, own_, peer, {})});
     } else if (r.message->kind == golden::MessageKind::kIcmp) {
       expected_.push_back(
@@ -298,8 +342,10 @@ class Fuzz {
     } else {
       Bytes m(f.begin() + 42, f.begin() + 42 + length);
       if (m.size() >= 16) net::put32(m, 4, swapped(net::get32(m, 4)));
-      peers_.push_back(peer);
-      message_arrives(m, peer);
+      size_t number = 0;
+      while (number < peers_.size() && !equal(peers_[number], peer)) ++number;
+      if (number == peers_.size()) peers_.push_back(peer);
+      message_arrives(m, static_cast<uint32_t>(number));
     }
   }
   // tile_clocks shown are those of the latest tile that was done.
@@ -307,11 +353,18 @@ class Fuzz {
     if (done > done_) shown_slow_ = slow_load_ || done > done_ + 1;
     done_ = done;
   }
-  void message_arrives(const Bytes& m, const net::Address& peer) {
+  void message_arrives(const Bytes& m, uint32_t number) {
+    const net::Address peer = peers_[number];
     const State before = state();
     note_done(before.done);
     const bool swept = model_.sweeping();
-    const std::vector<Bytes> replies = model_.message(m, static_cast<uint32_t>(peers_.size() - 1));
+    const uint32_t limited = model_.counter(net::kLimited), other = model_.map_peer();
+    const std::vector<Bytes> replies = model_.message(m, number);
+    if (model_.counter(net::kLimited) != limited) seen(m[3] == net::kOpen ? "OPEN limited" : "limited");
+    if (before.has(net::kFlagSession) && number != other && m.size() >= 16 && model_.latest_code()) {
+      if (m[3] == net::kOpen && *model_.latest_code() == net::kOk) seen("OPEN moves the session");
+      if (m[3] == net::kStatus && net::get32(m, 4) == model_.token()) seen("STATUS with the token from elsewhere");
+    }
     const State after = state();
     note_done(after.done);
     watch(before);
@@ -340,7 +393,11 @@ class Fuzz {
   }
   void name_message(const Bytes& m, const State& before, const State& after, bool swept, bool answered) {
     const auto code = model_.latest_code();
-    if (!code) return seen("no message");
+    if (!code) {
+      const bool no_message = m.size() < 16 || net::get16(m, 0) != net::kMagic;
+      if (no_message || (m[3] & net::kReply) != 0) seen(no_message ? "no message" : "answer");
+      return;
+    }
     const uint8_t type = m[3];
     if (m[2] != net::kVersion) return seen("other version");
     if (type == 0 || type > net::kSet) return seen("unknown type");
@@ -354,6 +411,9 @@ class Fuzz {
       if (before.engine == 2) seen("CLOSE in a sweep");
       if (before.engine == 4) seen("CLOSE while the map waits");
     }
+    if (*code == net::kBadMessage && type == net::kStart && m.size() >= net::kHeaderBytes + net::kStartBytes &&
+        net::get32(m, 20) >> 24 == 0 && net::get32(m, 24) >> 16 == 0 && net::get32(m, 20) * net::get32(m, 24) != 0)
+      seen("START with other chunks");
     if (*code == net::kNotReady && type == net::kWrite) seen("WRITE beyond the slots");
     if (*code != net::kOk) return;
     if (type == net::kOpen && open) seen("OPEN again");
@@ -437,6 +497,7 @@ class Fuzz {
   }
   void mask(Bytes& got, Bytes& want, const Expected& e) {
     const uint8_t type = want[45];
+    if (net::get16(want, 38) == 8 + net::kHeaderBytes) return;
     if (type == (net::kInfo | net::kReply) && want[52] == net::kOk) return;
     if (type == (net::kCounters | net::kReply) && want[52] == net::kOk) {
       for (size_t i = 0; i < 2; ++i) {
@@ -575,13 +636,19 @@ class Fuzz {
     return b;
   }
   size_t write_size() const { return static_cast<size_t>(config_.chunk_pairs()) * config_.pair_bytes(); }
-  void say(const Bytes& m, int host = 0) { put(net::make_udp(hosts_[host], own_, m)); }
+  void say(const Bytes& m) { put(net::make_udp(hosts_[static_cast<size_t>(speaker())], own_, m)); }
+  Bytes list_request(uint8_t type) {
+    return message(
+        type, 0, 0,
+        Bytes((type == net::kInfo ? net::kInfoRequestBytes : net::kCountersRequestBytes) - net::kHeaderBytes));
+  }
 
   // What a good host would do now.
   Bytes next_message() {
     const State s = state();
     if (!s.has(net::kFlagSession)) {
       if (!one_in(4)) return wrong_message();
+      if (!one_in(4)) need(golden::Arbiter::Bucket::kOpen);
       return message(net::kOpen, 0, 0, number(static_cast<uint32_t>(below(2))));
     }
     if (one_in(model_.sweeping() ? 4 : 90)) return message(net::kClose);
@@ -643,6 +710,7 @@ class Fuzz {
     uint32_t tile = near(one_in(2) ? s.row_tile : s.map_tile), index = near(s.base);
     Bytes body;
     if (type == net::kOpen) body = number(static_cast<uint32_t>(below(3)));
+    if (type == net::kInfo || type == net::kCounters) body.resize(list_request(type).size() - net::kHeaderBytes);
     if (type == net::kTable) {
       tile = one_in(2) ? s.table : near(s.table), index = one_in(3) ? 0 : near(s.words);
       body = one_in(3) ? noise(4 * static_cast<size_t>(1 + below(8))) : one_in(3) ? noise(4 * 364) : words(0, 364);
@@ -725,7 +793,8 @@ class Fuzz {
     } else if (kind < 12) {
       f = net::make_icmp_echo(hosts_[below(3)], own_, 8, noise(static_cast<size_t>(4 + below(one_in(8) ? 1460 : 60))));
     } else {
-      f = net::make_udp(hosts_[below(one_in(8) ? 3 : 1)], own_, kind < 68 ? next_message() : wrong_message());
+      const Bytes m = kind < 68 ? next_message() : wrong_message();
+      f = net::make_udp(hosts_[static_cast<size_t>(one_in(8) ? below(3) : speaker())], own_, m);
     }
     const int harm = below(48);
     if (harm == 0) return put(f, true);
@@ -750,13 +819,22 @@ class Fuzz {
     latest_.clear();
     std::vector<Bytes> answers;
     std::vector<bool> arp;
+    using Bucket = golden::Arbiter::Bucket;
+    // As many as are answered; less than full, so that a tick meanwhile is not lost.
+    if (model_.left(Bucket::kArp) < 3 || model_.left(Bucket::kOther) < 6) return;
+    if (model_.left(Bucket::kArp) == net::kBucketAnswers) put(net::make_arp_request(hosts_[0], own_.ip));
+    if (model_.left(Bucket::kOther) == net::kBucketAnswers) put(net::make_icmp_echo(hosts_[0], own_, 8, noise(8)));
+    latest_.clear();
+    int pings = model_.left(Bucket::kOther), arps = model_.left(Bucket::kArp);
     const int count = 4 + below(14);
     const bool large = one_in(2);
     for (int i = 0; i < count; ++i) {
       Bytes id = noise(static_cast<size_t>(4 + below(large ? 1460 : 120)));
       net::put32(id, 0, static_cast<uint32_t>(i) << 16 | (any() & 0xffff));
       const net::Address& host = hosts_[below(3)];
-      arp.push_back(one_in(4));
+      if (pings == 0 && arps == 0) break;
+      arp.push_back(pings == 0 || (arps > 0 && one_in(4)));
+      --(arp.back() ? arps : pings);
       Bytes f = arp.back() ? net::make_arp_request(host, own_.ip) : net::make_icmp_echo(host, own_, 8, id);
       answers.push_back(arp.back() ? golden::transmit(golden::MessageKind::kArp, own_, host, {})
                                    : golden::transmit(golden::MessageKind::kIcmp, own_, host, id));
@@ -781,6 +859,7 @@ class Fuzz {
         ++replies_;
         for (const auto counter : {net::kRxFrames, arp[i] ? net::kArp : net::kIcmp, net::kTxFrames})
           model_.count(counter);
+        REQUIRE(model_.allow(arp[i] ? Bucket::kArp : Bucket::kOther));
         seen("burst: answered");
       } else {
         model_.count(net::kRxNoSlot);
@@ -790,12 +869,13 @@ class Fuzz {
     REQUIRE(next == out_.size());
     REQUIRE(next >= 2);
     out_.clear();
-    say(message(net::kCounters));
+    say(list_request(net::kCounters));
   }
 
   // Silence for as long as a session lasts.
   void wait_for_timeout() {
     linger_ = false;
+    need(golden::Arbiter::Bucket::kOpen);
     if (!model_.session_open()) say(message(net::kOpen, 0, 0, number(1)));
     say(message(net::kStatus));
     if (!model_.session_open()) return;
@@ -810,7 +890,7 @@ class Fuzz {
     seen("session timeout");
     waits_changed_ += config_.clk_khz / 256;  // the chip counts whole milliseconds
     say(message(net::kStatus));
-    say(message(net::kCounters));
+    say(list_request(net::kCounters));
   }
 
   // Everything must work now: counters, ARP, ping, a whole pair of tiles, the next one sent while the last is swept.
@@ -818,15 +898,17 @@ class Fuzz {
     in_round_ = true;
     linger_ = false;
     rest();
+    need(golden::Arbiter::Bucket::kOpen);
+    need(golden::Arbiter::Bucket::kArp);
+    need(golden::Arbiter::Bucket::kOther, 3);
     say(message(net::kClose));
-    // Another host may have a session still.
     REQUIRE_FALSE(model_.session_open());
     say(message(net::kOpen, 0, 0, number(77)));
-    say(message(net::kCounters));
-    say(message(net::kInfo));
+    say(list_request(net::kCounters));
+    say(list_request(net::kInfo));
     put(net::make_arp_request(hosts_[0], own_.ip));
     REQUIRE(latest_.size() == 1);
-    put(net::make_icmp_echo(hosts_[0], own_, 8, noise(32)));
+    put(net::make_icmp_echo(hosts_[1], own_, 8, noise(32)));
     REQUIRE(latest_.size() == 1);
     new_table();
     for (size_t at = 0; at < table_.size(); at += 32)

@@ -92,6 +92,7 @@ class VerilatedChip : public ChipModel {
 
   bool session() const override { return dut_->led_session != 0; }
   bool busy() const override { return dut_->led_busy != 0; }
+  unsigned clock_missing() const override { return dut_->clock_missing; }
   int64_t launches() const override { return launches_; }
   int64_t busy_clocks() const override { return busy_clocks_; }
 

@@ -38,6 +38,7 @@ class Message {
   size_t needed = 0;    // shorter is truncated
   bool request = true;  // direction
   bool wanted = true;   // somebody waits for an answer
+  bool bare = false;    // the header alone is no less
   bool other_version = false;
   net::Header header;
 
@@ -119,7 +120,7 @@ class Message {
     }
     if (padding_at_ != 0 && n > padding_at_)
       e.add("psweep." + padding_name_, static_cast<long>(padding_at_), static_cast<long>(n - padding_at_), kAny);
-    if (n < needed) e.experts.insert("truncated");
+    if (n < needed && !(bare && n == net::kHeaderBytes)) e.experts.insert("truncated");
     if (n > 2 && other_version) e.experts.insert("version");
     if (n >= net::kHeaderBytes) {
       e.experts.insert(header_experts.begin(), header_experts.end());
@@ -146,6 +147,18 @@ class Message {
 using Layout = std::optional<net::ArbiterConfig>;
 
 // Requests -----------------------------------------------------------------------------------------------------------
+
+// Without a payload; INFO and COUNTERS have to be as long as their replies.
+inline Message bare_request(const net::Header& h, uint8_t reserved = 0) {
+  Message m("bare request", true, h, net::kVersion, reserved);
+  const size_t least = h.type == net::kInfo       ? net::kInfoRequestBytes
+                       : h.type == net::kCounters ? net::kCountersRequestBytes
+                                                  : 0;
+  m.tail = [least](Expectation& e, size_t n) {
+    if (n < least) e.experts.insert("length");
+  };
+  return m;
+}
 
 inline Message open_request(const net::Header& h, uint32_t nonce) {
   Message m("OPEN", true, h);
@@ -268,8 +281,19 @@ inline std::string runs(const std::vector<bool>& set, uint32_t base) {
   return text.empty() ? "none" : text;
 }
 
+// Of OPEN, and to those whom the chip does not know; others may be longer.
+inline bool always_bare(const net::Header& h) {
+  return h.type == (net::kOpen | net::kReply) || h.flags == net::kBusy || h.flags == net::kNoSession;
+}
+inline bool may_be_bare(const net::Header& h) {
+  return always_bare(h) || h.flags == net::kBadMessage ||
+         (h.flags == net::kOk && h.type == (net::kClose | net::kReply));
+}
+inline Message bare_reply(const net::Header& h) { return Message("bare reply", false, h); }
+
 inline Message status_reply(const net::Header& h, const net::Status& s, const Layout& layout) {
   Message m("status block", false, h);
+  m.bare = may_be_bare(h);
   m.box("status");
   m.u16("status.row_tile", s.row_tile);
   m.u16("status.flags", s.flags);
@@ -366,8 +390,7 @@ inline Message counters_reply(const net::Header& h, const std::vector<uint32_t>&
   Message m("COUNTERS reply", false, h);
   m.box("counters");
   for (size_t i = 0; i < net::kCounterWords; ++i) {
-    const char* name = net::kCounterNames[i];
-    m.u32(std::string("counters.") + (name ? name : "reserved"), values.at(i));
+    m.u32(std::string("counters.") + net::kCounterNames[i], values.at(i));
   }
   return m;
 }

@@ -228,7 +228,14 @@ std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout,
   };
   padded(open_request(request(net::kOpen), random.bits(32)));
   for (const uint8_t type : {net::kClose, net::kInfo, net::kCounters, net::kStatus, net::kRelease})
-    padded(Message("bare request", true, request(type), net::kVersion, static_cast<uint8_t>(random.bits(8))));
+    padded(bare_request(request(type), static_cast<uint8_t>(random.bits(8))));
+  // As the host sends them.
+  for (const uint8_t type : {net::kInfo, net::kCounters}) {
+    Message m = bare_request(request(type));
+    const size_t least = type == net::kInfo ? net::kInfoRequestBytes : net::kCountersRequestBytes;
+    m.padding(Bytes(least - net::kHeaderBytes + random.bits(2), 0));
+    all.push_back(std::move(m));
+  }
   {
     auto h = request(net::kTable);
     h.index = static_cast<uint16_t>(random.between(0, 8000));
@@ -277,7 +284,7 @@ std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout,
   all.push_back(opaque("unknown request", true, request(0), net::kVersion, random.bytes(7)));
   all.push_back(opaque("unknown request", true, request(static_cast<uint8_t>(random.between(0x0c, 0xff))),
                        net::kVersion, random.bytes(random.between(0, 40))));
-  const auto other_version = static_cast<uint8_t>(random.between(2, 255));
+  const auto other_version = static_cast<uint8_t>(random.coin() ? 1 : random.between(3, 255));
   all.push_back(opaque("other version", true, request(static_cast<uint8_t>(random.between(1, 11))), other_version,
                        random.bytes(6)));
   all.push_back(opaque("other version", false, reply(static_cast<uint8_t>(random.between(1, 11))), other_version,
@@ -285,13 +292,20 @@ std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout,
 
   auto status = [&](const char* what, const net::Header& h) {
     const int words = layout ? (layout->row_slots + 31) / 32 : random.between(0, small ? 2 : 32);
+    if (may_be_bare(h)) {
+      Message m = bare_reply(h);
+      m.what = what;
+      if (always_bare(h)) m.padding(random.bytes(random.between(0, 9)));  // not of this chip
+      all.push_back(std::move(m));
+    }
+    if (always_bare(h)) return;
     Message m = status_reply(h, random_status(random, words), layout);
     m.what = what;
     all.push_back(std::move(m));
   };
   for (const uint8_t type : {net::kOpen, net::kClose, net::kStatus, net::kTable, net::kStart, net::kWrite, net::kRead,
                              net::kRelease, net::kSet})
-    status("status reply", reply(type));
+    for (int code = 0; code <= 6; ++code) status("status reply", reply(type, code));
   status("INFO refused", reply(net::kInfo, random.between(1, 5)));
   status("COUNTERS refused", reply(net::kCounters, random.between(1, 5)));
   status("unknown type refused", reply(0, net::kBadMessage));
@@ -463,7 +477,7 @@ class Script {
   }
   long answer(uint8_t type, uint16_t sequence, uint8_t code, uint16_t tile = 0, uint16_t index = 0) {
     return send(chip, host, static_cast<uint8_t>(type | net::kReply), sequence, code, tile, index,
-                Bytes(4 * net::kStatusWords, 0));
+                type == net::kOpen ? Bytes() : Bytes(4 * net::kStatusWords, 0));
   }
   long map(uint16_t sequence, uint16_t tile, uint16_t index) {
     return send(chip, host, net::kMap, sequence, net::kOk, tile, index, Bytes(8, 0));
@@ -626,12 +640,13 @@ TEST_CASE("dissector: replies find their requests, repetitions the first of them
     s.want(frame).experts.insert("no_request");
 
   // A packet doubled on the wire, of those that are asked all the time.
-  const long info = s.ask(net::kInfo, 20, 0, 0, {});
-  repeated(s.ask(net::kInfo, 20, 0, 0, {}), info, "repeated");
+  const Bytes zeros(net::kInfoRequestBytes - net::kHeaderBytes, 0);
+  const long info = s.ask(net::kInfo, 20, 0, 0, zeros);
+  repeated(s.ask(net::kInfo, 20, 0, 0, zeros), info, "repeated");
   const long told = s.answer(net::kInfo, 20, net::kBadMessage);
   s.pair(info, told);
   s.want(told).experts.insert("code");
-  const long later = s.ask(net::kInfo, 21, 0, 0, {});
+  const long later = s.ask(net::kInfo, 21, 0, 0, zeros);
   const long told_later = s.answer(net::kInfo, 21, net::kBadMessage);
   s.pair(later, told_later);
   s.want(told_later).experts.insert("code");
@@ -859,7 +874,7 @@ Message rebuilt(const Bytes& b, bool request, const Layout& layout, int threshol
       case net::kSet:
         return padded(set_request(h, words.at(0)));
       default:
-        return padded(Message("bare request", true, h));
+        return padded(bare_request(h));
     }
   }
   if (h.type == net::kMap && h.flags == net::kOk) {
@@ -882,6 +897,7 @@ Message rebuilt(const Bytes& b, bool request, const Layout& layout, int threshol
     return info_reply(h, c->config, mac, static_cast<uint32_t>(c->counters), {0, 0, 0, 0});
   }
   if (h.type == (net::kCounters | net::kReply) && h.flags == net::kOk) return counters_reply(h, words);
+  if (always_bare(h) || (may_be_bare(h) && words.empty())) return padded(bare_reply(h));
   const auto s = net::parse_status(words);
   REQUIRE(s);
   return status_reply(h, *s, layout);

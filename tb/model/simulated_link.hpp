@@ -137,7 +137,7 @@ class SimulatedLink : public net::Transport {
     while (down_free_ <= now_) {
       const auto packet = chip_.map_packet();
       if (!packet) break;
-      transmit(*packet, down_free_, to_host_);
+      if (chip_.map_peer() == host) transmit(*packet, down_free_, to_host_);
     }
     if (meddle) {
       std::vector<net::Bytes> extra;

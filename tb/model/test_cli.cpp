@@ -661,7 +661,44 @@ TEST_CASE("psweep depth over UDP writes what the fixed engine writes", "[cli][ne
   CHECK(link["down_Mbit_per_s"] > 0);
   CHECK(link["sessions"] == 1);
   CHECK(link["malformed"] == 0);
+  CHECK(link["tiles_repeated"] == 0);
+  CHECK(link["tiles_repeated_by_error"].empty());
+  CHECK(link["tiles_unconfirmed"] == 0);
+  CHECK(link["counters_known"] == true);
   if (drop_every) CHECK(link["resent"] > 0);
+}
+
+TEST_CASE("psweep depth over UDP: a tile that fails is sent again and told", "[cli][net]") {
+  const TemporaryDir dir;
+  write_wall(dir, 10);
+  REQUIRE(psweep_run(dir, kInput + std::string("-q -o fixed")).code == 0);
+  UdpChip chip(wall_chip());
+  chip.fail_tiles = 2;
+  const Outcome o = psweep_run(dir, kInput + std::string("-o udp --engine ") + chip.url());
+  INFO(o.out << o.err);
+  REQUIRE(o.code == 0);
+  CHECK_THAT(o.out, contains("tiles that failed and were sent again: 2 (engine error bits: window 2)"));
+  CHECK(same_bytes(dir / "udp/depth.pfm", dir / "fixed/depth.pfm"));
+  const auto link = nlohmann::json::parse(read_file(dir / "udp/report.json"))["link"];
+  CHECK(link["tiles_repeated"] == 2);
+  CHECK(link["tiles_repeated_by_error"]["window"] == 2);
+  CHECK(link["sessions"] == 3);
+}
+
+TEST_CASE("psweep depth over UDP: a lost goodbye does not cost the map", "[cli][net]") {
+  const TemporaryDir dir;
+  write_wall(dir, 10);
+  REQUIRE(psweep_run(dir, kInput + std::string("-q -o fixed")).code == 0);
+  UdpChip chip(wall_chip());
+  chip.deaf_to_close = true;
+  const Outcome o = psweep_run(dir, kInput + std::string("-o udp --engine ") + chip.url());
+  INFO(o.out << o.err);
+  REQUIRE(o.code == 0);
+  CHECK_THAT(o.out, contains("its counters at the end are not known"));
+  CHECK(same_bytes(dir / "udp/depth.pfm", dir / "fixed/depth.pfm"));
+  const auto link = nlohmann::json::parse(read_file(dir / "udp/report.json"))["link"];
+  CHECK(link["counters_known"] == false);
+  CHECK(link["wait_rows_clocks"].is_null());
 }
 
 TEST_CASE("psweep info and bench-link", "[cli][net]") {
@@ -678,7 +715,8 @@ TEST_CASE("psweep info and bench-link", "[cli][net]") {
   CHECK(j["capabilities"]["mac"] == "02:00:00:00:00:01");
   CHECK(j["state"]["session"] == false);
   CHECK(j["counters"]["sessions"] == 0);
-  CHECK(j["counters"].size() == 29);
+  CHECK(j["counters"].size() == net::kCounterWords);
+  CHECK(j["counters"].contains("tiles_failed"));
 
   const Outcome bench = psweep_run(dir, "bench-link --seconds 0.3 --json " + chip.url());
   INFO(bench.err);

@@ -22,6 +22,15 @@ namespace psweep {
 class UdpChip {
  public:
   explicit UdpChip(const net::ArbiterConfig& config) : chip_(config) {
+    chip_.set_compute([this](const golden::TileJob& job, const std::vector<golden::PlaneEntry>& table,
+                             const golden::Pixels& left, const golden::Pixels& right) {
+      auto result = golden::run_tile(chip_.config().engine, job, table, left, right);
+      if (fail_tiles > 0) {
+        --fail_tiles;
+        result.window_errors = 1;
+      }
+      return result;
+    });
     socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -38,8 +47,10 @@ class UdpChip {
   UdpChip(const UdpChip&) = delete;
   UdpChip& operator=(const UdpChip&) = delete;
 
-  std::atomic<int> drop_every{0};         // 0: nothing is lost; n: every n-th packet, both ways
-  std::atomic<double> sweep_seconds{-1};  // of a tile; negative: as the engine's clocks
+  std::atomic<int> drop_every{0};          // 0: nothing is lost; n: every n-th packet, both ways
+  std::atomic<int> fail_tiles{0};          // so many tiles from now on have samples outside their window
+  std::atomic<bool> deaf_to_close{false};  // from the first CLOSE on nothing arrives
+  std::atomic<double> sweep_seconds{-1};   // of a tile; negative: as the engine's clocks
 
   int port() const { return port_; }
   std::string url() const { return "udp://127.0.0.1:" + std::to_string(port_); }
@@ -73,7 +84,8 @@ class UdpChip {
       const double now = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       chip_.set_sweep_time(sweep_seconds);
       chip_.step(now);
-      if (got >= 0 && !dropped()) {
+      if (got > 3 && deaf_to_close && m[3] == net::kClose) dead_ = true;
+      if (got >= 0 && !dead_ && !dropped()) {
         m.resize(static_cast<size_t>(got));
         uint32_t peer = 0;
         while (peer < peers.size() &&
@@ -97,6 +109,7 @@ class UdpChip {
   int socket_ = -1, port_ = 0;
   std::atomic<bool> over_{false};
   int packets_ = 0;
+  bool dead_ = false;
   std::thread thread_;
 };
 

@@ -31,6 +31,7 @@ class ChipRecorder : public ChipModel {
     tx_en_ = to_.out("mii_tx_en", 1);
     session_ = to_.out("led_session", 1);
     busy_ = to_.out("led_busy", 1);
+    missing_ = to_.out("clock_missing", 2);
   }
   ~ChipRecorder() override { to_.close(); }
 
@@ -44,6 +45,7 @@ class ChipRecorder : public ChipModel {
   void set_reset(bool active) override {
     to_.set(arst_n_, !active);
     awake_ = 0;
+    reset_ = active;
     step("000");
     chip_->set_reset(active);
   }
@@ -66,6 +68,7 @@ class ChipRecorder : public ChipModel {
   }
   MiiSample tx_edge(Time at) override {
     const bool session = chip_->session(), busy = chip_->busy();
+    const unsigned missing = chip_->clock_missing();
     const MiiSample shown = chip_->tx_edge(at);
     // Four edges after a reset everything has passed through the synchronisers.
     const uint64_t defined = awake_ > 4 ? ~uint64_t{0} : 0;
@@ -73,13 +76,15 @@ class ChipRecorder : public ChipModel {
     to_.expect(tx_en_, shown.valid, defined);
     to_.expect(session_, session, defined);
     to_.expect(busy_, busy, defined);
+    to_.expect(missing_, missing, defined);
     to_.step("001");
-    ++awake_;
+    awake_ = reset_ ? 0 : awake_ + 1;
     return shown;
   }
 
   bool session() const override { return chip_->session(); }
   bool busy() const override { return chip_->busy(); }
+  unsigned clock_missing() const override { return chip_->clock_missing(); }
   int64_t launches() const override { return chip_->launches(); }
   int64_t busy_clocks() const override { return chip_->busy_clocks(); }
   void open_wave(const std::string& file) override { chip_->open_wave(file); }
@@ -88,14 +93,16 @@ class ChipRecorder : public ChipModel {
  private:
   // Of another clock than mii_tx_clk, or of none.
   void step(const char* rising, uint64_t count = 1) {
-    for (const int port : {txd_, tx_en_, session_, busy_}) to_.expect(port, 0, 0);
+    for (const int port : {txd_, tx_en_, session_, busy_, missing_}) to_.expect(port, 0, 0);
     to_.step(rising, count);
   }
 
   std::unique_ptr<ChipModel> chip_;
   replay::Recording to_;
-  int arst_n_, rxd_, rx_dv_, rx_er_, crs_, col_, full_duplex_, speed_100_, straps_, txd_, tx_en_, session_, busy_;
+  int arst_n_, rxd_, rx_dv_, rx_er_, crs_, col_, full_duplex_, speed_100_, straps_, txd_, tx_en_, session_, busy_,
+      missing_;
   int awake_ = 0;  // edges of mii_tx_clk since the reset
+  bool reset_ = true;
 };
 
 }  // namespace psweep::chip

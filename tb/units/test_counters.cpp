@@ -8,7 +8,8 @@
 #include "Vcounters_1.h"
 #include "Vcounters_13.h"
 #include "Vcounters_2.h"
-#include "Vcounters_32.h"
+#include "Vcounters_40.h"
+#include "Vcounters_64.h"
 #include "golden/counters.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -53,15 +54,15 @@ class Bench : public Agent {
   uint64_t longest_read = 0, reads = 0;
 
   void drive() override {
-    uint32_t events = 0;
+    uint64_t events = 0;
     for (int i = 0; i < count_; ++i) {
       auto& due = next_[static_cast<size_t>(i)];
       if (quiet || sim.cycle() < due || !std::bernoulli_distribution(activity)(random_)) continue;
-      events |= 1u << i;
+      events |= uint64_t{1} << i;
       due = sim.cycle() + model.spacing() + (random_() % 3 == 0 ? random_() % 5 : 0);
     }
     set(dut.events, events);
-    if (!hold_index && random_() % 9 == 0) index(static_cast<int>(random_() % static_cast<unsigned>(count_ + 1)) & 31);
+    if (!hold_index && random_() % 9 == 0) index(static_cast<int>(random_() % static_cast<unsigned>(count_ + 1)) & 63);
   }
   void index(int n) {
     if (n != dut.r_index) steady_ = 0;
@@ -96,7 +97,7 @@ class Bench : public Agent {
     ++steady_;
     quiet_for_ = dut.events ? 0 : quiet_for_ + 1;
     for (int i = 0; i < count_; ++i)
-      if (dut.events >> i & 1) {
+      if (uint64_t{dut.events} >> i & 1) {
         model.pulse(i, now);
         pulses_[static_cast<size_t>(i)].push_back(now);
       }
@@ -106,7 +107,7 @@ class Bench : public Agent {
     quiet = hold_index = true;
     sim.run(model.counted_after() + 1);
     for (int i = 0; i < count_; ++i) {
-      index((i + 1) & 31);  // another one in between, so that it is read afresh
+      index((i + 1) & 63);  // another one in between, so that it is read afresh
       sim.tick();
       index(i);
       do sim.tick();
@@ -118,7 +119,7 @@ class Bench : public Agent {
 
  private:
   template <class T>
-  static void set(T& port, uint32_t value) {
+  static void set(T& port, uint64_t value) {
     port = static_cast<T>(value);
   }
   int count_;
@@ -158,7 +159,8 @@ void run_all(int count) {
 
 }  // namespace
 
-TEST_CASE("counters: 32") { run_all<Vcounters_32>(32); }
+TEST_CASE("counters: 64") { run_all<Vcounters_64>(64); }
+TEST_CASE("counters: 40") { run_all<Vcounters_40>(40); }
 TEST_CASE("counters: 13") { run_all<Vcounters_13>(13); }
 TEST_CASE("counters: 2") { run_all<Vcounters_2>(2); }
 TEST_CASE("counters: 1, past many carries") {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // mac_rx: bytes and verdict of every frame as the model says, for every length, error, preamble and gap; a reader that
-// pauses costs beats, never the verdict and never without bit 5.
+// pauses costs beats, never the verdict and never without bit 5; what begins while the station itself sends in half
+// duplex is not received; upsets of every bit of every register.
 #include <random>
 
 #include "Vmac_rx.h"
+#include "Vmac_rx_upset.h"
 #include "golden/mac_rx.hpp"
 #include "golden/mac_tx.hpp"
 #include "net/frames.hpp"
@@ -38,6 +40,8 @@ struct Bench : Agent {
   explicit Bench(uint32_t seed = 1) : sim(100000000, seed), random(seed) {
     sim.add(*this);
     dut.m_ready = 1;
+    dut.full_duplex = 0;
+    dut.sending = 0;
     sim.reset();
     sim.run(4);  // the receiver wants to see rx_dv = 0 first
   }
@@ -363,4 +367,128 @@ TEST_CASE("mac_rx: a reset within a frame leaves nothing of it") {
     CHECK(bench.bytes.empty());
     check(bench, s, 1);
   }
+}
+
+TEST_CASE("mac_rx: in half duplex what begins while the station sends is not received, the next frame is") {
+  Bench bench(test_seed());
+  std::mt19937 random(test_seed());
+  int masked = 0, received = 0;
+  for (const bool full : {false, true}) {
+    bench.dut.full_duplex = full;
+    for (int late = -30; late <= 60; ++late) {   // clocks from the beginning of `sending` to rx_dv
+      for (const int length : {24, 144, 300}) {  // of it: a collision, the shortest frame, a longer one
+        Samples s;
+        silence(s, 40);
+        const Bytes frame_bytes = good_frame(random, 64);
+        frame(s, frame_bytes, 0);
+        silence(s, 400);
+        frame(s, frame_bytes);
+        const int begin = 40 - late;
+        bench.samples = s;
+        bench.at = 0;
+        bench.frames.clear();
+        for (int clock = 0; clock < static_cast<int>(s.size()) + 40; ++clock) {
+          bench.dut.sending = clock >= begin && clock < begin + length;
+          bench.sim.tick();
+        }
+        // rx_dv is in its register a clock after the pin, `sending` two; the SFD comes 15 clocks behind rx_dv.
+        const int on = begin + 2, off = begin + length + 2, rise = 41, sfd = 41 + 15;
+        const bool mask = !full && on <= sfd && off > rise;
+        INFO("late " << late << ", length " << length << ", full duplex " << full);
+        REQUIRE(bench.frames.size() == (mask ? 1 : 2));
+        for (const auto& f : bench.frames) REQUIRE((f.verdict == 0 && f.bytes == frame_bytes));
+        masked += mask;
+        received += !mask;
+      }
+    }
+  }
+  CHECK(masked > 150);
+  CHECK(received > 300);
+  CHECK(bench.broken == 0);
+}
+
+TEST_CASE("mac_rx: tick shows that there is a clock") {
+  Bench bench(test_seed());
+  unsigned before = bench.dut.tick;
+  for (int i = 0; i < 20; ++i) {
+    bench.sim.tick();
+    REQUIRE(bench.dut.tick != before);
+    before = bench.dut.tick;
+  }
+}
+
+namespace {
+
+struct Site {
+  const char* name;
+  int bits;
+};
+const std::vector<Site> kSites = {
+#include "mac_rx_upset.inc"
+};
+
+}  // namespace
+
+TEST_CASE("mac_rx: an upset of any register at any time costs the frame or adds an empty one, the next one is right") {
+  Sim<Vmac_rx_upset> sim(2000000000, test_seed());
+  Vmac_rx_upset& dut = sim.dut();
+  std::mt19937 random(test_seed());
+  dut.full_duplex = dut.m_ready = 1;
+  dut.sending = 0;
+  dut.flip_site = 0;
+  dut.flip_mask = 0;
+  dut.mii_rx_dv = dut.mii_rx_er = 0;
+  sim.reset();
+  sim.run(4);
+  std::vector<ReceivedFrame> got;
+  Bytes bytes;
+  const auto play = [&](const Samples& samples, int from, int site, uint64_t mask) {
+    for (size_t i = 0; i < samples.size(); ++i) {
+      dut.mii_rx_dv = samples[i].dv;
+      dut.mii_rxd = samples[i].nibble;
+      dut.m_ready = random() % 4 != 0;
+      const bool now = static_cast<int>(i) == from;
+      dut.flip_site = static_cast<uint16_t>(now ? site : 0);
+      dut.flip_mask = now ? mask : 0;
+      dut.eval();
+      if (dut.m_valid && dut.m_ready) {
+        if (dut.m_last) {
+          got.push_back({bytes, dut.m_data});
+          bytes.clear();
+        } else {
+          bytes.push_back(dut.m_data);
+        }
+      }
+      sim.tick();
+    }
+  };
+  int upsets = 0, harmed = 0;
+  for (size_t site = 0; site < kSites.size(); ++site) {
+    for (int bit = 0; bit < kSites[site].bits; ++bit) {
+      for (int round = 0; round < 12; ++round) {
+        const Bytes first = good_frame(random, 64), second = good_frame(random, 70);
+        Samples s;
+        silence(s, 12);
+        frame(s, first);
+        got.clear();
+        bytes.clear();
+        play(s, round < 2 ? static_cast<int>(random() % 12) : static_cast<int>(random() % s.size()),
+             static_cast<int>(site) + 1, uint64_t{1} << bit);
+        harmed += got.size() != 1 || got[0].verdict != 0 || got[0].bytes != first;
+        got.clear();
+        bytes.clear();
+        Samples next;
+        frame(next, second);
+        play(next, -1, 0, 0);
+        INFO(kSites[site].name << ", bit " << bit);
+        REQUIRE(got.size() == 1);
+        REQUIRE((got[0].verdict & ~kBeatLost) == 0);
+        if (got[0].verdict == 0) REQUIRE(got[0].bytes == second);
+        ++upsets;
+      }
+    }
+  }
+  INFO(upsets << " upsets, " << harmed << " harmed their frame");
+  CHECK(upsets > 800);
+  CHECK(harmed > 100);
 }

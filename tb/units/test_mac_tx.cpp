@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // mac_tx: nibbles of every frame as the model says, gap, slots and answers in full duplex; in half duplex collisions at
-// every nibble, backoff, late and excessive collisions, deference; traffic with other stations on a bus.
+// every nibble, backoff, late and excessive collisions, deference and its limit; traffic with other stations on a bus;
+// slots out of turn, upsets of every bit of every register.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -8,6 +9,7 @@
 #include <random>
 
 #include "Vmac_tx.h"
+#include "Vmac_tx_upset.h"
 #include "support/catch.hpp"
 #include "support/mii_bus.hpp"
 #include "support/scoreboard.hpp"
@@ -97,6 +99,8 @@ struct Bench : Agent {
     sim.run(60);
     turn_ = (turn_ + count) % 2;
   }
+  // As if packet_tx had counted once too often: the next frame is for the other slot.
+  void skip_turn() { turn_ = 1 - turn_; }
 
  private:
   std::vector<uint8_t> ram_ = std::vector<uint8_t>(4096, 0xaa);
@@ -325,6 +329,223 @@ TEST_CASE("mac_tx: a reset within a frame, jam or backoff, the next frame is rig
     REQUIRE(bench.bursts.size() == 1);
     CHECK(bench.bursts[0].nibbles == transmit_nibbles(frame));
   }
+}
+
+TEST_CASE("mac_tx: a frame that is deferred for 2^14 nibbles is given up, each frame has all of them") {
+  Bench bench(test_seed(), false);
+  std::mt19937 random(test_seed());
+  uint64_t fall = UINT64_MAX;  // of crs
+  bench.pins = [&](Bench& b) { b.dut.mii_crs = b.sim.cycle() < fall; };
+  bench.sim.run(10);
+  std::vector<Bytes> frames;
+  for (int i = 0; i < 5; ++i) frames.push_back(random_frame(random, 60));
+  const uint64_t begin = bench.sim.cycle();
+  bench.send(frames);
+  CHECK(bench.bursts.empty());
+  uint64_t before = begin;
+  for (const Answer& a : bench.answers) {
+    CHECK(a.result == 3);
+    CHECK(a.clock - before <= (1u << 14) + 4);
+    CHECK(a.clock - before >= (1u << 14) - 16);
+    before = a.clock;
+  }
+  // A little less, and it is sent.
+  fall = bench.sim.cycle() + (1u << 14) - 100;
+  bench.send({random_frame(random, 60)});
+  CHECK(bench.answers.at(0).result == 0);
+  CHECK(bench.bursts.size() == 1);
+  // After a collision, a backoff of up to 1023 slots counts for nothing; in full duplex crs means nothing.
+  for (const bool full : {false, true}) {
+    bench.dut.full_duplex = full;
+    int attempt = 0;
+    bool was = false;
+    bench.pins = [&](Bench& b) {
+      attempt += b.sending() && !was;
+      was = b.sending();
+      b.dut.mii_col = b.sending() && attempt <= 11 && b.nibble() == 30;
+      b.dut.mii_crs = full || (attempt == 11 && !b.sending());
+    };
+    bench.send({random_frame(random, 60)});
+    CHECK(bench.answers.at(0).result == (full ? 0 : 3));
+    CHECK(bench.bursts.size() == (full ? 1 : 11));
+    if (!full) {
+      CHECK(bench.answers[0].clock - bench.bursts.back().end() >= (1u << 14) - 16);
+      bench.pins = [](Bench& b) { b.dut.mii_crs = b.dut.mii_col = 0; };
+      const Bytes next = random_frame(random, 60);
+      bench.send({next});
+      CHECK(bench.answers.at(0).result == 0);
+      CHECK(bench.bursts.at(0).nibbles == transmit_nibbles(next));
+    }
+  }
+}
+
+TEST_CASE("mac_tx: a slot out of turn is served, and from then on turns are right again") {
+  Bench bench(test_seed(), true);
+  std::mt19937 random(test_seed());
+  for (int round = 0; round < 20; ++round) {
+    const unsigned before = bench.dut.resynchronised;
+    if (round % 2) {  // what comes next is for the slot that is not served next
+      bench.skip_turn();
+      const Bytes alone = random_frame(random, 60);
+      bench.send({alone});
+      REQUIRE(bench.bursts.size() == 1);
+      CHECK(bench.bursts[0].nibbles == transmit_nibbles(alone));
+    }
+    std::vector<Bytes> frames;
+    for (int i = 0; i < 1 + round % 5; ++i) frames.push_back(random_frame(random, 60 + random() % 20));
+    bench.send(frames);
+    REQUIRE(bench.bursts.size() == frames.size());
+    for (size_t i = 0; i < frames.size(); ++i) CHECK(bench.bursts[i].nibbles == transmit_nibbles(frames[i]));
+    CHECK((bench.dut.resynchronised != before) == (round % 2 != 0));
+  }
+}
+
+TEST_CASE("mac_tx: sending is tx_en a clock before, and tick never rests") {
+  Bench bench(test_seed(), false);
+  std::mt19937 random(test_seed());
+  unsigned ahead = 0, ticks = 0, last_tick = 0;
+  int rest = 0, most = 0;
+  uint64_t apart = 0, on = 0;
+  bench.pins = [&](Bench& b) {
+    b.dut.eval();
+    apart += b.dut.mii_tx_en != ahead;
+    on += ahead;
+    ahead = b.dut.sending;
+    rest = b.dut.tick == last_tick ? rest + 1 : 0;
+    ticks += rest == 0;
+    last_tick = b.dut.tick;
+    most = std::max(most, rest);
+    b.dut.mii_crs = b.sending() || random() % 5000 == 0;
+    b.dut.mii_col = b.sending() && b.nibble() == 30 && random() % 3 != 0;
+  };
+  std::vector<Bytes> frames;
+  for (int i = 0; i < 30; ++i) frames.push_back(random_frame(random, 14 + random() % 200));
+  bench.send(frames);
+  bench.sim.run(1000);
+  CHECK(apart <= 1);  // the first look
+  CHECK(on > 3000);
+  CHECK(ticks > 1000);
+  CHECK(most < 40);
+}
+
+namespace {
+
+struct Site {
+  const char* name;
+  int bits;
+};
+const std::vector<Site> kSites = {
+#include "mac_tx_upset.inc"
+};
+
+// The handshake as packet_tx does it, and a medium that collides now and then.
+struct UpsetBench : Agent {
+  Sim<Vmac_tx_upset> sim{2000000000, test_seed()};
+  Vmac_tx_upset& dut = sim.dut();
+  std::mt19937 random{test_seed() + 3};
+  std::vector<Bytes> queue;
+  std::vector<std::vector<uint8_t>> bursts;
+  int slot = 0;
+  bool collide = false;
+  uint64_t recovered = 0, resynchronised = 0;
+
+  UpsetBench() {
+    sim.add(*this);
+    dut.full_duplex = dut.mii_crs = dut.mii_col = dut.f_request = 0;
+    dut.flip_site = 0;
+    dut.flip_mask = 0;
+    sim.reset();
+    sim.run(30);
+  }
+  bool idle() const { return queue.empty() && dut.f_request == dut.f_done && !dut.mii_tx_en; }
+  void drive() override {
+    if (!queue.empty() && ((dut.f_request ^ dut.f_done) >> slot & 1) == 0) {
+      const Bytes& f = queue.front();
+      std::copy(f.begin(), f.end(), ram_.begin() + slot * 2048);
+      (slot ? dut.f_length_1 : dut.f_length_0) = static_cast<SData>(f.size());
+      const unsigned bit = 1u << slot;
+      dut.f_request = static_cast<CData>((dut.f_request & ~bit) | (~dut.f_done & bit));
+      queue.erase(queue.begin());
+      slot = 1 - slot;
+    }
+    dut.r_data = data_;
+    dut.mii_col = collide && dut.mii_tx_en && random() % 150 == 0;
+    dut.mii_crs = dut.mii_tx_en || (collide && random() % 40 == 0);
+  }
+  void sample() override {
+    data_ = ram_[dut.r_addr];
+    if (dut.mii_tx_en) {
+      if (!on_) bursts.emplace_back();
+      bursts.back().push_back(dut.mii_txd);
+    }
+    on_ = dut.mii_tx_en;
+    recovered += dut.recovered != was_recovered_;
+    resynchronised += dut.resynchronised != was_resynchronised_;
+    was_recovered_ = dut.recovered;
+    was_resynchronised_ = dut.resynchronised;
+  }
+
+ private:
+  std::vector<uint8_t> ram_ = std::vector<uint8_t>(4096, 0x55);
+  uint8_t data_ = 0;
+  bool on_ = false;
+  unsigned was_recovered_ = 0, was_resynchronised_ = 0;
+};
+
+}  // namespace
+
+TEST_CASE("mac_tx: after an upset of any register all that is requested is done, and what follows is right") {
+  UpsetBench bench;
+  uint64_t upsets = 0, harmed = 0;
+  for (size_t site = 0; site < kSites.size(); ++site) {
+    const std::string name = kSites[site].name;
+    for (int bit = 0; bit < kSites[site].bits; ++bit) {
+      for (int round = 0; round < (kSites[site].bits == 1 ? 60 : 8); ++round) {
+        INFO(name << ", bit " << bit << ", round " << round);
+        bench.collide = round % 2 != 0;
+        std::vector<Bytes> frames;
+        for (int i = 0; i < (round % 4 == 0 ? 0 : 4); ++i) frames.push_back(random_frame(bench.random, 60));
+        bench.queue = frames;
+        bench.bursts.clear();
+        bench.sim.run(bench.random() % (frames.empty() ? 40 : 700));
+        bench.dut.flip_site = static_cast<uint16_t>(site + 1);
+        bench.dut.flip_mask = uint64_t{1} << bit;
+        bench.sim.tick();
+        bench.dut.flip_site = 0;
+        // The longest state is a backoff of 2^17 nibbles; then everything has to be over soon.
+        int clocks = 0, quiet = 0;
+        for (; quiet < 60 && clocks < 800000; ++clocks) {
+          bench.sim.tick();
+          quiet = bench.idle() ? quiet + 1 : 0;
+        }
+        REQUIRE(quiet == 60);
+        if (!bench.collide) {
+          size_t whole = 0;
+          for (const auto& b : bench.bursts) whole += whole < frames.size() && b == transmit_nibbles(frames[whole]);
+          harmed += whole != frames.size() || bench.bursts.size() != frames.size();
+        }
+        bench.collide = false;
+        bench.bursts.clear();
+        frames.clear();
+        for (int i = 0; i < 3; ++i) frames.push_back(random_frame(bench.random, 60));
+        bench.queue = frames;
+        for (clocks = 0, quiet = 0; quiet < 60 && clocks < 3000; ++clocks) {
+          bench.sim.tick();
+          quiet = bench.idle() ? quiet + 1 : 0;
+        }
+        REQUIRE(quiet == 60);
+        REQUIRE(bench.bursts.size() == frames.size());
+        for (size_t i = 0; i < frames.size(); ++i) REQUIRE(bench.bursts[i] == transmit_nibbles(frames[i]));
+        ++upsets;
+      }
+    }
+  }
+  INFO(upsets << " upsets, " << harmed << " harmed a frame, " << bench.recovered << " recovered, "
+              << bench.resynchronised << " resynchronised");
+  CHECK(upsets > 1500);
+  CHECK(harmed > 100);
+  CHECK(bench.recovered > 50);
+  CHECK(bench.resynchronised > 20);
 }
 
 namespace {

@@ -32,6 +32,7 @@ struct Rates {
   double stray = 0;      // another chunk than the next one is asked for
   double forget = 0;     // per clock, in any state
   bool largest = false;  // all maps are as large as can be
+  double fail = 0;       // per clock: the launched tile, or none, has failed
 };
 
 template <class Dut>
@@ -44,7 +45,7 @@ class Bench : public Agent {
         shape_(shape),
         rates_(rates),
         random_(seed) {
-    dut.s_tvalid = dut.release_map = dut.clear = dut.f_start = dut.f_take = 0;
+    dut.s_tvalid = dut.release_map = dut.clear = dut.fail = dut.f_start = dut.f_take = 0;
     dut.keep = dut.f_chunk = 0;
     new_tile();
     sim.add(*this);
@@ -55,7 +56,8 @@ class Bench : public Agent {
   Dut& dut;
   golden::MapBuffer model;
   Scoreboard status{"status"}, bytes{"bytes"};
-  int tiles_done = 0, forgotten = 0, chunks_read = 0, reread = 0, not_ready = 0;
+  int tiles_done = 0, forgotten = 0, failed = 0, failed_sending = 0, failed_complete = 0, chunks_read = 0, reread = 0,
+      not_ready = 0;
   uint64_t chunk_clocks = 0;  // first to last byte of the latest whole chunk
 
   bool ok() const { return status.ok() && bytes.ok(); }
@@ -63,13 +65,16 @@ class Bench : public Agent {
 
   void drive() override {
     dut.release_map = dut.clear = dut.f_start = 0;
+    dut.fail = chance(rates_.fail);
     if (chance(rates_.forget)) {
       (draw(2) ? dut.clear : dut.release_map) = 1;
     } else if (done_ && chance(0.2)) {
       dut.release_map = 1;
     }
-    if (!offered_ && left_ > 0) offered_ = !chance(rates_.source);
-    dut.s_tvalid = offered_;
+    // What a chunk that is being sent is read from stays as it is.
+    if (!sending_) wait_sent_ = false;
+    if (!offered_ && left_ > 0 && !wait_sent_) offered_ = !chance(rates_.source);
+    dut.s_tvalid = offered_ && !dut.fail;  // a failed tile sends no more
     if (!offered_ || !held_) cell_ = (uint64_t{draw(0x10000)} << 32 | random_()) & mask();
     set(dut.s_tdata, cell_);
     dut.s_tlast = offered_ ? left_ == 1 : draw(2) != 0;
@@ -84,6 +89,7 @@ class Bench : public Agent {
     status.compare(dut.s_tready, model.takes(), place, now);
     status.compare(dut.busy, model.busy(), place, now);
     status.compare(dut.complete, model.complete(), place, now);
+    status.compare(dut.recovered, 0, place, now);
     status.compare(dut.count, static_cast<uint64_t>(model.count()), place, now);
     status.compare(dut.started, fire && !model.busy(), place, now);
     // Readiness: late only by the walk, early never.
@@ -138,6 +144,18 @@ class Bench : public Agent {
       --left_;
     }
     done_ = model.complete() && next_ >= model.finished() && !sending_;
+    if (dut.fail && !forget) {
+      if (model.complete()) {
+        ++failed_complete;
+      } else {
+        ++failed;
+        failed_sending += sending_;
+        wait_sent_ = sending_;
+        model.fail();
+        ready_for_ = 0;
+        new_tile();
+      }
+    }
     if (forget) {
       ++forgotten;
       if (done_) ++tiles_done;
@@ -183,12 +201,12 @@ class Bench : public Agent {
       steady_for_ = 0;
     }
     if (sending_) {
-      // The question may change while the bytes come.
-      if (chance(0.1)) ask();
+      // The question may change once the bytes come.
+      if (got_ > 0 && chance(0.1)) ask();
       return;
     }
     dut.eval();
-    if (steady_for_ >= 3 && dut.f_ready) {
+    if (steady_for_ >= 3 && dut.f_ready && model.ready(dut.f_chunk)) {
       if (chance(0.5)) dut.f_start = !dut.release_map && !dut.clear;
       return;
     }
@@ -205,7 +223,8 @@ class Bench : public Agent {
   Shape shape_;
   Rates rates_;
   std::mt19937 random_;
-  bool offered_ = false, held_ = false, done_ = false, sending_ = false, byte_held_ = false, was_busy_ = false;
+  bool offered_ = false, held_ = false, done_ = false, sending_ = false, byte_held_ = false, was_busy_ = false,
+       wait_sent_ = false;
   int left_ = 0, next_ = 0, keep_ = 0, chunk_ = 0, tile_ = -1;
   int steady_for_ = 0, ready_for_ = 0, unready_for_ = 0;
   uint64_t cell_ = 0, held_byte_ = 0, first_byte_ = 0;
@@ -227,6 +246,11 @@ void run_tiles(const Shape& shape, const Rates& rates, int tiles) {
   CHECK(bench.not_ready > 0);
   if (rates.stray > 0 && rates.forget < 0.01) CHECK(bench.reread > 0);
   if (rates.forget > 0) CHECK(bench.forgotten > bench.tiles_done);
+  if (rates.fail > 0) {
+    CHECK(bench.failed > 5);
+    CHECK(bench.failed_complete > 5);
+    CHECK(bench.failed_sending > 0);
+  }
 }
 
 template <class Dut>
@@ -236,6 +260,7 @@ void run_all(const Shape& shape) {
   run_tiles<Dut>(shape, {0.7, 0.0, 0.3, 0.0}, 40);
   run_tiles<Dut>(shape, {0.3, 0.3, 0.5, 0.002}, 40);
   run_tiles<Dut>(shape, {0.1, 0.1, 0.2, 0.03}, 3);
+  run_tiles<Dut>(shape, {0.3, 0.3, 0.3, 0.0, false, 0.01}, 60);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 // lengths of UDP and ICMP, every bit of every header flipped, all faults alone and in pairs, checksums at their
 // corners, a full ring, random and mutated frames, garbage of any length; what waits in the ring stays as it is. Frames
 // come from net/frames.hpp, and the outcome of the fault pairs is written down here: neither is the model's opinion.
+// Upsets of every bit of every register: what waits is empty soon, and then all is right again.
 #include <algorithm>
 #include <deque>
 #include <functional>
@@ -12,6 +13,7 @@
 
 #include "Vpacket_rx_2.h"
 #include "Vpacket_rx_4.h"
+#include "Vpacket_rx_upset.h"
 #include "golden/packet_rx.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -48,7 +50,7 @@ struct Bench : Agent {
     Bytes bytes;
     uint8_t verdict;
     int number;
-    uint16_t want;  // events; 0: what the model says
+    uint32_t want;  // events; 0: what the model says
   };
   struct Waiting {
     golden::Message message;
@@ -64,7 +66,7 @@ struct Bench : Agent {
   Scoreboard events{"events"}, shown{"m_valid"}, kinds{"m_kind"}, lengths{"m_length"}, bytes{"r_data"},
       outcomes{"outcome"};
   net::Address own;
-  std::array<uint64_t, 16> count{};
+  std::array<uint64_t, golden::kReceiveEvents> count{};
 
   // What goes in.
   std::deque<Frame> queue;
@@ -74,7 +76,7 @@ struct Bench : Agent {
   bool offering = false, room = false;
 
   // What must come out.
-  std::deque<std::pair<uint64_t, uint16_t>> pulses;
+  std::deque<std::pair<uint64_t, uint32_t>> pulses;
   std::deque<Waiting> waiting;
   size_t used = 0;             // granules of what waits
   size_t taken = 0;            // granules of the frame on its way
@@ -89,10 +91,11 @@ struct Bench : Agent {
   Bench() {
     for (auto& b : own.mac) b = static_cast<uint8_t>(random());
     own.mac[0] &= 0xfe;
-    own.ip = static_cast<uint32_t>(random());
+    own.ip = 0xc0000000 | below(1u << 24);  // none of somebody()'s
     own.port = Traits<Dut>::kPort;
     dut.s_valid = dut.s_last = dut.m_done = 0;
     dut.r_addr = 0;
+    dut.half_duplex = 0;
     uint64_t mac = 0;
     for (const uint8_t b : own.mac) mac = mac << 8 | b;
     dut.own_mac = mac;
@@ -110,12 +113,13 @@ struct Bench : Agent {
   net::Address somebody() {
     net::Address a;
     for (auto& b : a.mac) b = static_cast<uint8_t>(random());
-    a.ip = static_cast<uint32_t>(random());
+    a.mac[0] &= 0xfe;
+    a.ip = (1 + below(126)) << 24 | below(1u << 24);
     a.port = static_cast<uint16_t>(random());
     return a;
   }
   // `frame` with its FCS.
-  void send(const Bytes& frame, uint8_t verdict = 0, uint16_t want = 0) {
+  void send(const Bytes& frame, uint8_t verdict = 0, uint32_t want = 0) {
     queue.push_back({frame, verdict, sent++, want});
   }
   Bytes closed(Bytes frame) {
@@ -153,13 +157,13 @@ struct Bench : Agent {
   void sample() override {
     const uint64_t now = sim.cycle();
     // Pulses.
-    uint16_t pulse = 0;
+    uint32_t pulse = 0;
     if (!pulses.empty() && pulses.front().first == now) {
       pulse = pulses.front().second;
       pulses.pop_front();
     }
     if (pulse != 0 || dut.events != 0) events.compare(dut.events, pulse, {}, now);
-    for (size_t i = 0; i < 16; ++i) count[i] += dut.events >> i & 1;
+    for (size_t i = 0; i < count.size(); ++i) count[i] += dut.events >> i & 1;
 
     // Messages.
     const bool valid = !waiting.empty() && now >= waiting.front().clock && now >= blocked_until;
@@ -187,7 +191,7 @@ struct Bench : Agent {
     if (next == 0) room = true, taken = 0;
     if (next < f.bytes.size() && next % golden::kGranule == 0) room = room && used_now + ++taken <= kGranules;
     if (next++ < f.bytes.size()) return;
-    const golden::Received r = golden::PacketRx(own, f.bytes).receive(f.verdict, room);
+    const golden::Received r = golden::PacketRx(own, f.bytes).receive(f.verdict, room, dut.half_duplex);
     if (f.want != 0) outcomes.compare(r.events, f.want, {f.number}, now);
     pulses.emplace_back(now + kEventLatency, r.events);
     if (r.message) {
@@ -212,10 +216,18 @@ struct Bench : Agent {
   }
 };
 
-constexpr uint16_t bit(int counter) { return static_cast<uint16_t>(1 << counter); }
-constexpr uint16_t kGoodArp = bit(net::kRxFrames) | bit(net::kArp);
-constexpr uint16_t kGoodIcmp = bit(net::kRxFrames) | bit(net::kIcmp);
-constexpr uint16_t kGoodUdp = bit(net::kRxFrames) | bit(net::kUdp);
+constexpr uint32_t bit(int counter) { return 1u << counter; }
+constexpr uint32_t kGoodArp = bit(net::kRxFrames) | bit(net::kArp);
+constexpr uint32_t kGoodIcmp = bit(net::kRxFrames) | bit(net::kIcmp);
+constexpr uint32_t kGoodUdp = bit(net::kRxFrames) | bit(net::kUdp);
+constexpr uint32_t kGoodClosed = bit(net::kRxFrames) | bit(net::kRxOther);
+constexpr uint32_t kBadSource = bit(golden::kEventBadSource);
+
+Bytes golden_own(const net::Address& own) {
+  Bytes b(own.mac.begin(), own.mac.end());
+  net::append32(b, own.ip);
+  return b;
+}
 
 // Makes the sums right again; `type`: which of them.
 void repair_header(Bytes& f) {
@@ -235,27 +247,33 @@ void repair_content(Bytes& f) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("packet_rx: every length of UDP and ICMP, with and without checksum, unicast and broadcast", "",
+TEMPLATE_TEST_CASE("packet_rx: every length of UDP and ICMP, with and without checksum; broadcasts are ARP alone", "",
                    Vpacket_rx_2, Vpacket_rx_4) {
   auto bench = std::make_unique<Bench<TestType>>();
   for (size_t size = 0; size <= 1472; ++size) {
     Bytes f = bench->udp(size);
     if (size % 3 == 1) net::put16(f, 40, 0);
-    if (size % 5 == 2) std::fill_n(f.begin(), 6, 0xff);
     bench->send(bench->closed(f), 0, kGoodUdp);
+    std::fill_n(f.begin(), 6, 0xff);
+    bench->send(bench->closed(f), 0, bit(net::kRxFiltered));
     f = bench->icmp(size);
-    if (size % 5 == 3) std::fill_n(f.begin(), 6, 0xff);
     bench->send(bench->closed(f), 0, kGoodIcmp);
     bench->finish();  // one by one, so that there is room
     if (size % 100 == 0) bench->send(bench->closed(bench->arp()), 0, kGoodArp);
+    if (size % 100 == 50) {  // ARP to the chip alone
+      f = bench->arp();
+      std::copy(bench->own.mac.begin(), bench->own.mac.end(), f.begin());
+      bench->send(bench->closed(f), 0, kGoodArp);
+    }
     bench->gaps = size % 7 == 0 ? 0.7 : 0;
     bench->finish();
   }
   bench->check();
   CHECK(bench->count[net::kUdp] == 1473);
   CHECK(bench->count[net::kIcmp] == 1473);
-  CHECK(bench->count[net::kArp] == 15);
-  CHECK(bench->count[net::kRxFrames] == 2 * 1473 + 15);
+  CHECK(bench->count[net::kArp] == 30);
+  CHECK(bench->count[net::kRxFiltered] == 1473);
+  CHECK(bench->count[net::kRxFrames] == 2 * 1473 + 30);
 }
 
 TEMPLATE_TEST_CASE("packet_rx: padding behind the packet changes nothing, a packet beyond the frame is refused", "",
@@ -326,6 +344,12 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
   auto flip = [](size_t at, uint8_t mask) {
     return [at, mask](Bytes& f, uint8_t&) { f[at] = static_cast<uint8_t>(f[at] ^ mask); };
   };
+  auto own_at = [&](size_t at, size_t bytes) {
+    return [&bench, at, bytes](Bytes& f, uint8_t&) {
+      const Bytes own = golden_own(bench->own);
+      std::copy_n(own.begin() + (bytes == 4 ? 6 : 0), bytes, f.begin() + static_cast<std::ptrdiff_t>(at));
+    };
+  };
   // In the order of precedence.
   const std::vector<Fault> faults = {
       {"overflow", net::kRxOverflow, verdict_bit(5), '*'},
@@ -352,13 +376,23 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
        [](Bytes& f, uint8_t&) { net::put16(f, 16, static_cast<uint32_t>(f.size() - 17)); }, 'p'},
       {"IP checksum", net::kIpHeader, [&broken](Bytes&, uint8_t&) { broken |= kHeaderSum; }, 'p'},
       {"other IP", net::kIpHeader, flip(33, 0x40), 'p'},
+      {"source MAC of a group", golden::kEventBadSource, flip(6, 0x01), '*'},
+      {"source MAC our own", golden::kEventBadSource, own_at(6, 6), '*'},
+      {"ARP sender of a group", golden::kEventBadSource, flip(22, 0x01), 'a'},
+      {"ARP sender's MAC our own", golden::kEventBadSource, own_at(22, 6), 'a'},
+      {"ARP sender's IP our own", golden::kEventBadSource, own_at(28, 4), 'a'},
+      {"source IP our own", golden::kEventBadSource, own_at(26, 4), 'p'},
+      {"source IP 0.0.0.0", golden::kEventBadSource, [](Bytes& f, uint8_t&) { net::put32(f, 26, 0); }, 'p'},
+      {"source IP 0/8", golden::kEventBadSource, set(26, 0), 'p'},
+      {"source IP 127/8", golden::kEventBadSource, set(26, 127), 'p'},
+      {"source IP 224/4", golden::kEventBadSource, set(26, 239), 'p'},
+      {"source IP 240/4", golden::kEventBadSource, set(26, 240), 'p'},
+      {"source IP all ones", golden::kEventBadSource, [](Bytes& f, uint8_t&) { net::put32(f, 26, ~0u); }, 'p'},
       {"more fragments", net::kIpFragment, flip(20, 0x20), 'p'},
       {"offset, high", net::kIpFragment, flip(20, 0x10), 'p'},
       {"offset, low", net::kIpFragment, flip(21, 0x01), 'p'},
       {"protocol TCP", net::kRxOther, set(23, 6), 'p'},
       {"protocol 0x13", net::kRxOther, set(23, 0x13), 'p'},
-      {"port, high", net::kRxOther, flip(36, 0x80), 'u'},
-      {"port, low", net::kRxOther, flip(37, 0x01), 'u'},
       {"ICMP reply", net::kRxOther, set(34, 0), 'i'},
       {"ICMP code", net::kRxOther, set(35, 1), 'i'},
       {"UDP length + 1", net::kChecksum, flip(39, 0x01), 'u'},
@@ -372,6 +406,7 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
       for (size_t b = a; b < faults.size(); ++b) {
         if (!applies(faults[a].kinds, kind) || !applies(faults[b].kinds, kind)) continue;
         Bytes f = bench->closed(kind == 'u' ? bench->udp(64) : kind == 'i' ? bench->icmp(65) : bench->arp());
+        std::copy(bench->own.mac.begin(), bench->own.mac.end(), f.begin());  // no broadcast: that is ARP's alone
         uint8_t verdict = 0;
         broken = 0;
         faults[b].make(f, verdict);
@@ -391,11 +426,102 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
       }
     }
   }
-  CHECK(bench->outcomes.compared() > 900);
+  CHECK(bench->outcomes.compared() > 1400);
   // A good frame after all that.
   bench->send(bench->closed(bench->udp(9)), 0, kGoodUdp);
   bench->finish();
   bench->check();
+}
+
+TEMPLATE_TEST_CASE("packet_rx: sources that may not be are refused, their neighbours are not", "", Vpacket_rx_2,
+                   Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  const net::Address& own = bench->own;
+  for (int first = 0; first < 256; ++first) {  // each first byte of the source's IP, with all zeros, ones, and others
+    for (const uint32_t rest : {0u, 0xffffffu, bench->below(1u << 24)}) {
+      net::Address from = bench->somebody();
+      from.ip = static_cast<uint32_t>(first) << 24 | rest;
+      if (from.ip == own.ip) continue;
+      const bool bad = first == 0 || first == 127 || first >= 224;
+      bench->send(bench->closed(net::make_udp(from, own, bench->noise(30))), 0, bad ? kBadSource : kGoodUdp);
+      bench->send(bench->closed(net::make_icmp_echo(from, own, 8, bench->noise(30))), 0, bad ? kBadSource : kGoodIcmp);
+      bench->send(bench->closed(net::make_arp_request(from, own.ip)), 0, kGoodArp);  // 0: a probe
+      bench->finish();
+    }
+  }
+  for (int at = 0; at < 10; ++at) {  // own but for one bit is somebody else
+    for (int flip = -1; flip < 8; ++flip) {
+      auto change = [&](Bytes f, size_t where) {
+        if (flip >= 0) f[where] = static_cast<uint8_t>(f[where] ^ 1 << flip);
+        if (f[13] == 0) repair_header(f), repair_content(f);
+        return bench->closed(f);
+      };
+      net::Address from = bench->somebody();
+      if (at < 6) {
+        from.mac = own.mac;
+        const uint32_t want = flip < 0 || (at == 0 && flip == 0) ? kBadSource : 0;
+        const size_t where = 6 + static_cast<size_t>(at);
+        bench->send(change(net::make_udp(from, own, bench->noise(30)), where), 0, want != 0 ? want : kGoodUdp);
+        Bytes f = net::make_arp_request(bench->somebody(), own.ip);
+        std::copy(own.mac.begin(), own.mac.end(), f.begin() + 6);
+        bench->send(change(f, where), 0, want != 0 ? want : kGoodArp);
+        f = net::make_arp_request(bench->somebody(), own.ip);
+        std::copy(own.mac.begin(), own.mac.end(), f.begin() + 22);
+        bench->send(change(f, where + 16), 0, want != 0 ? want : kGoodArp);
+      } else {
+        from.ip = own.ip;
+        const size_t where = 20 + static_cast<size_t>(at);
+        const bool net_bad = flip >= 0 && at == 6 && (own.ip >> 24 ^ 1u << flip) >= 224;
+        const uint32_t want = flip < 0 || net_bad ? kBadSource : kGoodUdp;
+        bench->send(change(net::make_udp(from, own, bench->noise(30)), where), 0, want);
+        bench->send(change(net::make_arp_request(from, own.ip), where + 2), 0, flip < 0 ? kBadSource : kGoodArp);
+      }
+      bench->finish();
+    }
+  }
+  bench->check();
+  CHECK(bench->count[golden::kEventBadSource] > 200);
+}
+
+TEMPLATE_TEST_CASE("packet_rx: UDP to every other port is a message of its own kind", "", Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (int i = -16; i < 300; ++i) {
+    net::Address to = bench->own;
+    to.port = static_cast<uint16_t>(i < 0 ? to.port ^ 1 << (i + 16) : bench->random());
+    if (to.port == bench->own.port) continue;
+    Bytes f = net::make_udp(bench->somebody(), to, bench->noise(bench->below(100)));
+    bench->send(bench->closed(f), 0, kGoodClosed);
+    Bytes bad = f;  // only with good sums, and only if it was for this chip alone
+    bad[41] = static_cast<uint8_t>(bad[41] ^ 1);
+    if ((bad[40] | bad[41]) != 0) bench->send(bench->closed(bad), 0, bit(net::kChecksum));
+    bad = f;
+    bad[39] = static_cast<uint8_t>(bad[39] ^ 2);
+    bench->send(bench->closed(bad), 0, bit(net::kChecksum));
+    std::fill_n(f.begin(), 6, 0xff);
+    bench->send(bench->closed(f), 0, bit(net::kRxFiltered));
+    bench->finish();
+  }
+  bench->check();
+  CHECK(bench->count[net::kUdp] == 0);
+}
+
+TEMPLATE_TEST_CASE("packet_rx: collision fragments are counted apart from short frames, in half duplex only", "",
+                   Vpacket_rx_2, Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  for (const bool half : {false, true}) {
+    bench->dut.half_duplex = half;
+    for (int verdict = 0; verdict < 64; ++verdict) {
+      const bool fragment = half && (verdict & 0x3d) == 5;
+      bench->send(bench->noise(bench->below(64)), static_cast<uint8_t>(verdict),
+                  fragment ? bit(golden::kEventFragment) : 0);
+      bench->finish();
+    }
+  }
+  bench->send(bench->closed(bench->udp(9)), 0, kGoodUdp);
+  bench->finish();
+  bench->check();
+  CHECK(bench->count[golden::kEventFragment] == 2);
+  CHECK(bench->count[net::kRxShort] == 4 + 2);
 }
 
 TEMPLATE_TEST_CASE("packet_rx: every verdict, and verdicts without a byte", "", Vpacket_rx_2, Vpacket_rx_4) {
@@ -568,6 +694,16 @@ TEMPLATE_TEST_CASE("packet_rx: random and mutated frames", "", Vpacket_rx_2, Vpa
               : how == 2 ? static_cast<uint8_t>(bench->random())
                          : static_cast<uint8_t>(f[at] ^ 1 << bench->below(8));
     }
+    if (f.size() >= 42 && bench->chance(0.15)) {  // sources that are none
+      const uint32_t how = bench->below(7);
+      if (how == 0) std::copy(bench->own.mac.begin(), bench->own.mac.end(), f.begin() + 6);
+      if (how == 1) f[6] |= 1;
+      if (how == 2) f[26] = static_cast<uint8_t>(bench->below(256));
+      if (how == 3) net::put32(f, f[13] == 6 ? 28 : 26, bench->own.ip);
+      if (how == 4) net::put32(f, f[13] == 6 ? 28 : 26, 0);
+      if (how == 5 && f[13] == 6) std::copy(bench->own.mac.begin(), bench->own.mac.end(), f.begin() + 22);
+      if (how == 6 && f[13] == 6) f[22] |= 1;
+    }
     if (f.size() >= 42 && bench->chance(0.3)) {  // hostile lengths
       const uint32_t real = static_cast<uint32_t>(f.size() - 14);
       const uint32_t choice[] = {0,     19, 20, 27, 28, real, real + 1, real + 4, real + 5, real - 1, 0x0800 + real,
@@ -593,14 +729,19 @@ TEMPLATE_TEST_CASE("packet_rx: random and mutated frames", "", Vpacket_rx_2, Vpa
   while (!bench->queue.empty()) {
     bench->max_hold = bench->below(3) == 0 ? 12000 : 0;
     bench->gaps = bench->below(4) * 0.25;
+    if (bench->gaps > 0) {
+      bench->sim.run_until([&] { return bench->next == 0 && bench->pulses.empty(); });
+      bench->dut.half_duplex = bench->below(2) != 0;
+    }
     bench->sim.run(3000);
   }
   bench->finish();
   bench->check();
-  for (int counter = 0; counter < 16; ++counter) {
-    INFO(net::kCounterNames[counter]);
+  for (int counter = 0; counter < golden::kEventResynchronised; ++counter) {
+    INFO("event " << counter);
     CHECK(bench->count[static_cast<size_t>(counter)] > 10);
   }
+  CHECK(bench->count[golden::kEventResynchronised] == 0);
 }
 
 TEMPLATE_TEST_CASE("packet_rx: reset in the middle of anything leaves nothing", "", Vpacket_rx_2, Vpacket_rx_4) {
@@ -623,4 +764,131 @@ TEMPLATE_TEST_CASE("packet_rx: reset in the middle of anything leaves nothing", 
     bench->finish();
   }
   bench->check();
+}
+
+namespace {
+
+struct Site {
+  const char* name;
+  int bits;
+};
+const std::vector<Site> kSites = {
+#include "packet_rx_upset.inc"
+};
+
+// Frames go in, messages are taken as they are shown, whatever they are.
+struct UpsetBench : Agent {
+  Sim<Vpacket_rx_upset> sim{2000000000, test_seed()};
+  Vpacket_rx_upset& dut = sim.dut();
+  std::mt19937 random{test_seed() + 5};
+  net::Address own;
+  std::deque<Bytes> queue;  // with FCS
+  size_t next = 0;
+  int hold = 0, most_hold = 60;
+  int shown_for = 0;          // clocks of the present message
+  std::vector<Bytes> taken;   // bytes 42 .. 45 of each: the number that send() gave it
+  std::array<int, 4> read{};  // of the present message
+  uint64_t resynchronised = 0;
+
+  UpsetBench() {
+    own.mac = {2, 0, 0x50, 0x53, 0x57, 1};
+    own.ip = 0x0a050002;
+    own.port = 20563;
+    dut.own_mac = 0x020050535701;
+    dut.own_ip = own.ip;
+    dut.half_duplex = dut.s_valid = dut.m_done = 0;
+    dut.flip_site = 0;
+    dut.flip_mask = 0;
+    sim.add(*this);
+    sim.reset();
+  }
+  void send(uint32_t number, size_t size) {
+    Bytes payload(size);
+    for (auto& b : payload) b = static_cast<uint8_t>(random());
+    net::put32(payload, 0, number);
+    Bytes f = net::make_udp({{2, 0, 0, 0, 0, 9}, 0x0a050001, 4000}, own, payload);
+    net::append_fcs(f);
+    queue.push_back(f);
+  }
+  void drive() override {
+    dut.s_valid = !queue.empty();
+    dut.s_last = dut.s_valid && next == queue.front().size();
+    dut.s_data = dut.s_valid && !dut.s_last ? queue.front()[next] : 0;
+    dut.m_done = shown_for == 6 + hold;
+    dut.r_addr = static_cast<uint16_t>(42 + shown_for);
+  }
+  void sample() override {
+    resynchronised += dut.events >> golden::kEventResynchronised & 1;
+    if (dut.s_valid && dut.s_ready && ++next > queue.front().size()) {
+      queue.pop_front();
+      next = 0;
+    }
+    if (!dut.m_valid) {
+      shown_for = 0;
+      return;
+    }
+    if (shown_for >= 1 && shown_for <= 4) read[static_cast<size_t>(shown_for - 1)] = dut.r_data;
+    if (dut.m_done) {
+      taken.push_back(Bytes(read.begin(), read.end()));
+      shown_for = 0;
+      hold = static_cast<int>(random() % static_cast<unsigned>(most_hold));
+    } else {
+      ++shown_for;
+    }
+  }
+};
+
+}  // namespace
+
+TEST_CASE("packet_rx: after an upset of any register the ring is empty soon, and everything is right again") {
+  UpsetBench bench;
+  uint32_t number = 0;
+  uint64_t wrong = 0, upsets = 0, ring = 0;
+  for (size_t site = 0; site < kSites.size(); ++site) {
+    for (int bit = 0; bit < kSites[site].bits; ++bit) {
+      for (int round = 0; round < 8; ++round) {
+        INFO(kSites[site].name << ", bit " << bit << ", round " << round);
+        // A busy ring, or (every fourth time) an idle one.
+        bench.most_hold = round % 4 == 0 ? 1 : 400;
+        const uint32_t first = number;
+        for (int i = 0; i < (round % 4 == 3 ? 0 : 6); ++i)
+          bench.send(number++, 4 + bench.random() % (i % 3 ? 30 : 1100));
+        bench.sim.run(bench.random() % (round % 4 == 3 ? 20 : 2000));
+        bench.dut.flip_site = static_cast<uint16_t>(site + 1);
+        bench.dut.flip_mask = uint64_t{1} << bit;
+        bench.sim.tick();
+        bench.dut.flip_site = 0;
+        bench.sim.run_until([&] { return bench.queue.empty(); });
+        // At most 16 messages are shown, each for at most 407 clocks.
+        int quiet = 0;
+        for (int i = 0; i < 16 * 410 + 30 && quiet < 30; ++i) {
+          bench.sim.tick();
+          quiet = bench.dut.m_valid ? 0 : quiet + 1;
+        }
+        REQUIRE(quiet == 30);
+        wrong += bench.taken.size() != number - first;
+        // One frame more may be judged by what was upset. From then on every frame is a message, in order.
+        bench.send(number++, 4);
+        bench.sim.run(600);
+        bench.taken.clear();
+        const uint32_t second = number;
+        for (int i = 0; i < 3; ++i) bench.send(number++, i == 1 ? 1100 : 4);
+        bench.sim.run_until([&] { return bench.queue.empty(); });
+        for (int i = 0; i < 2000 && bench.taken.size() < 3; ++i) bench.sim.tick();
+        bench.sim.run(10);
+        REQUIRE(bench.taken.size() == 3);
+        for (uint32_t i = 0; i < 3; ++i) REQUIRE(net::get32(bench.taken[i], 0) == second + i);
+        bench.taken.clear();
+        ++upsets;
+        const std::string name = kSites[site].name;
+        ring += name == "read_head" || name == "write_head" || name == "waiting";
+      }
+    }
+  }
+  INFO(upsets << " upsets, " << wrong << " with messages lost or shown too often, " << bench.resynchronised
+              << " resynchronised");
+  CHECK(upsets > 800);
+  CHECK(ring > 30);
+  CHECK(wrong > 10);
+  CHECK(bench.resynchronised > 10);
 }

@@ -40,6 +40,7 @@ struct Rates {
   bool sequential = false;  // chunks in order
   double hold = 0;          // b_hold rises, for up to 60 clocks
   bool largest = false;     // all tiles are as large as can be
+  double fail = 0;          // per clock: the launched tile, or none, has failed
 };
 
 // Drives everything and compares in every clock. One tile after the other, of random sizes.
@@ -55,6 +56,7 @@ class Bench : public Agent {
         max_chunks_(max_chunks),
         random_(seed) {
     dut.clear = dut.open_tile = dut.w_check = dut.w_valid = dut.w_commit = dut.go = dut.m_tready = dut.b_hold = 0;
+    dut.fail = 0;
     sim.add(*this);
     sim.reset();
     quiet_from_ = 0;
@@ -64,7 +66,7 @@ class Bench : public Agent {
   Dut& dut;
   golden::RowBuffer model;
   Scoreboard pixels{"pixels"}, answers{"answers"}, bits{"bitmap"}, status{"status"};
-  int tiles_done = 0, clears = 0, new_chunks = 0, repeated = 0, refused = 0, holds = 0;
+  int tiles_done = 0, clears = 0, fails = 0, fails_staged = 0, new_chunks = 0, repeated = 0, refused = 0, holds = 0;
   uint64_t go_clock = 0, first_clock = 0, last_clock = 0;  // of the latest tile: go, first and last beat
 
   bool ok() const { return pixels.ok() && answers.ok() && bits.ok() && status.ok(); }
@@ -81,6 +83,13 @@ class Bench : public Agent {
     if (hold_left_ == 0 && chance(rates_.hold)) hold_left_ = 1 + draw(60);
     dut.b_hold = hold_left_ > 0;
     dut.b_index = static_cast<SData>(chance(0.9) ? draw(shape_.slots) : random_() & 0x3ff);
+    dut.fail = chance(rates_.fail);
+    if (dut.fail && gone_) {
+      late_ = writing_;
+      writing_ = false;
+      wait_ = 0;
+      return;
+    }
     if (chance(rates_.clear)) {
       dut.clear = 1;
       late_ = writing_;
@@ -116,7 +125,8 @@ class Bench : public Agent {
       status.compare(dut.base, base_before_, {tile_count_}, now);
       ++holds;
     }
-    was_held_ = dut.b_hold && !dut.clear && !dut.open_tile;
+    const bool cleared = dut.clear || (dut.fail && gone_);
+    was_held_ = dut.b_hold && !cleared && !dut.open_tile;
     base_before_ = dut.base;
     if (!clearing_) {
       const int low = model.chunks_of(taken_), high = model.chunks_of(std::min(taken_ + 1, model.pixels()));
@@ -128,6 +138,8 @@ class Bench : public Agent {
       status.compare(dut.received, static_cast<uint64_t>(model.received()), {tile_count_}, now);
     }
     if (tile_) status.compare(dut.busy, 1, {tile_count_}, now);
+    status.compare(dut.staged, tile_ && !gone_, {tile_count_}, now);
+    status.compare(dut.recovered, 0, {tile_count_}, now);
     if (!tile_ && now > quiet_from_ + static_cast<uint64_t>(shape_.bits()) + 3)
       status.compare(dut.busy, 0, {tile_count_}, now);
     if (!gone_) {
@@ -154,9 +166,10 @@ class Bench : public Agent {
       taken_ = 0;
       answer_due_ = ~uint64_t{0};
     }
-    if (dut.clear) {
-      ++clears;
-      model.clear();
+    if (dut.fail && tile_ && !gone_) ++fails_staged;
+    if (cleared) {
+      ++(dut.clear ? clears : fails);
+      dut.clear ? model.clear() : model.fail(true);
       tile_ = gone_ = held_ = false;
       clearing_ = true;
       quiet_from_ = now;
@@ -215,7 +228,7 @@ class Bench : public Agent {
 
   void sample_bits(uint64_t now) {
     // What is asked in this clock; certain only if nothing changes in this clock.
-    const bool steady = !dut.w_commit && !dut.clear && !dut.open_tile;
+    const bool steady = !dut.w_commit && !dut.clear && !dut.open_tile && !dut.fail;
     history_.push_back({now, model.bit(dut.b_index), steady, model.base()});
     if (history_.size() < 3) return;
     const Asked asked = history_.front();
@@ -300,6 +313,8 @@ void run_tiles(const Shape& shape, const Rates& rates, int max_chunks, int tiles
   if (rates.clear < 0.01) CHECK((bench.repeated > 0 && bench.refused > 0));
   if (rates.clear > 0) CHECK(bench.clears > 0);
   if (rates.hold > 0) CHECK(bench.holds > 0);
+  if (rates.fail > 0) CHECK(bench.fails > 0);
+  if (rates.fail > 0) CHECK(bench.fails_staged > 0);
 }
 
 template <class Dut>
@@ -312,6 +327,7 @@ void run_all(const Shape& shape, int tiles) {
   run_tiles<Dut>(shape, {0.2, 0.3, 0.2, 0.0, false, 0.1}, few, tiles);
   run_tiles<Dut>(shape, {0.1, 0.2, 0.2, 0.5 / (chunks * shape.chunk_pairs), false}, chunks, tiles);
   run_tiles<Dut>(shape, {0.1, 0.2, 0.2, 0.05, false}, 2, std::max(2, tiles / 10));
+  run_tiles<Dut>(shape, {0.1, 0.2, 0.2, 0.0, false, 0.01, false, 0.5 / (chunks * shape.chunk_pairs)}, chunks, tiles);
 }
 
 }  // namespace
@@ -322,6 +338,54 @@ TEST_CASE("row_buffer: 12-bit pixels, 3 slots") { run_all<Vrow_buffer_12_3_3>({1
 TEST_CASE("row_buffer: 1-bit pixels, 7 slots") { run_all<Vrow_buffer_1_9_7>({1, 9, 7}, 30); }
 TEST_CASE("row_buffer: 5-bit pixels, 16 slots") { run_all<Vrow_buffer_5_17_16>({5, 17, 16}, 12); }
 TEST_CASE("row_buffer: the shortest chunks and fewest slots") { run_all<Vrow_buffer_4_2_2>({4, 2, 2}, 100); }
+
+TEST_CASE("row_buffer: a chunk that is committed after the end of its tile leaves nothing behind") {
+  // The tile has more chunks than pixels (a START that the chip should have refused): chunk 1 is not needed.
+  Sim<Vrow_buffer_4_2_2> sim(1000, test_seed());
+  auto& dut = sim.dut();
+  dut.clear = dut.open_tile = dut.w_check = dut.w_valid = dut.w_commit = dut.go = dut.b_hold = dut.fail = 0;
+  dut.m_tready = 1;
+  sim.reset();
+  auto pulse = [&](auto& pin) {
+    pin = 1;
+    sim.tick();
+    pin = 0;
+  };
+  auto wait_idle = [&] {
+    dut.eval();
+    sim.run_until([&] { return dut.busy == 0; });
+  };
+  auto open = [&](int pixels) {
+    wait_idle();
+    dut.open_pixels = static_cast<uint32_t>(pixels);
+    dut.open_chunks = 2;
+    pulse(dut.open_tile);
+  };
+  auto check = [&](int chunk) {
+    dut.w_chunk = static_cast<SData>(chunk);
+    pulse(dut.w_check);
+    sim.run(2);
+    return dut.w_new == 1;
+  };
+  auto bytes = [&] {
+    dut.w_valid = 1;
+    sim.run(2);
+    dut.w_valid = 0;
+  };
+  open(2);
+  REQUIRE(check(0));
+  bytes();
+  pulse(dut.w_commit);
+  REQUIRE(check(1));
+  bytes();
+  pulse(dut.go);
+  wait_idle();
+  pulse(dut.w_commit);
+  open(4);
+  CHECK(dut.received == 0);
+  CHECK(check(0));
+  CHECK(check(1));
+}
 
 TEST_CASE("row_buffer: a pixel per clock from the first to the last") {
   // Everything is there before go, nothing is written meanwhile.
