@@ -6,9 +6,9 @@
 --              most 4*G_COUNT + 15 clocks
 --   Read     : r_valid = '1': r_data is the counter r_index, read after r_index became what it is; both hold until
 --              r_index changes. Up to 7 clocks later. A number from G_COUNT on reads something without meaning
---   Phases   : words are kept in halves, for an adder of 16 bits: 0 read the lower half of the scanned counter, 1 write
---              it back, read the upper one, 2 write it back, read the lower half of r_index, 3 take it, read the upper
---              half; 0 take it
+--   Phases   : words are kept in halves, for an adder of 16 bits, each half in a RAM of its own: 0 read the scanned
+--              counter's lower half, 1 write it back, read the upper one, 2 write it back, 3 read both halves of r_index,
+--              0 take them. A word that is read while it is written is not used
 --   Reset    : rst only. A first scan of 4*G_COUNT clocks writes zeros; events until then may be lost, r_valid is '0'
 --   Golden   : sw/golden/counters.hpp
 library ieee;
@@ -48,13 +48,13 @@ architecture rtl of counters is
   signal carry    : std_logic;
   signal addend   : unsigned(15 downto 0);
   signal sum      : unsigned(16 downto 0);
-  signal write    : std_logic;
-  signal waddr    : std_logic_vector(C_INDEX_W downto 0);
-  signal raddr    : std_logic_vector(C_INDEX_W downto 0);
-  signal rdata    : std_logic_vector(15 downto 0);
+  signal write_low  : std_logic;
+  signal write_high : std_logic;
+  signal raddr    : std_logic_vector(C_INDEX_W - 1 downto 0);
+  signal low      : std_logic_vector(15 downto 0);
+  signal high     : std_logic_vector(15 downto 0);
   signal index_q  : std_logic_vector(5 downto 0);
   signal same     : std_logic;
-  signal half     : std_logic; -- the lower half of r_index is there
   signal have     : std_logic;
 
 begin
@@ -69,13 +69,15 @@ begin
 
   four     <= scan(C_INDEX_W - 1 downto 2);
   move     <= to_bit(phase = 0) and to_bit(scan(1 downto 0) = 0);
-  write    <= phase(1) xor phase(0);
-  waddr    <= std_logic_vector(scan) & phase(1);
-  raddr    <= r_index(C_INDEX_W - 1 downto 0) & phase(0) when phase(1) = '1' else std_logic_vector(scan) & phase(0);
+  write_low  <= to_bit(phase = 1);
+  write_high <= to_bit(phase = 2);
+  raddr    <= r_index(C_INDEX_W - 1 downto 0) when phase(1) = '1' else std_logic_vector(scan);
 
   -- Zeros go in, not out: so they cost nothing.
   add(0)   <= not first and due(0) when phase(0) = '1' else not first and carry;
-  addend   <= (others => '0') when first = '1' else unsigned(rdata);
+  addend   <= (others => '0') when first = '1'
+              else unsigned(low) when phase(0) = '1'
+              else unsigned(high);
   sum      <= ('0' & addend) + add;
 
   g_column : for i in 0 to 3 generate
@@ -96,15 +98,26 @@ begin
     wide(G_COUNT - 1 downto 0) <= events;
   end process p_wide;
 
-  u_words : entity work.ram_sdp
-    generic map (G_DATA_W => 16, G_DEPTH => 2 ** (C_INDEX_W + 1), G_LATENCY => 1)
+  u_low : entity work.ram_sdp
+    generic map (G_DATA_W => 16, G_DEPTH => 2 ** C_INDEX_W, G_LATENCY => 1)
     port map (
       clk   => clk,
-      we    => write,
-      waddr => waddr,
+      we    => write_low,
+      waddr => std_logic_vector(scan),
       wdata => std_logic_vector(sum(15 downto 0)),
       raddr => raddr,
-      rdata => rdata
+      rdata => low
+    );
+
+  u_high : entity work.ram_sdp
+    generic map (G_DATA_W => 16, G_DEPTH => 2 ** C_INDEX_W, G_LATENCY => 1)
+    port map (
+      clk   => clk,
+      we    => write_high,
+      waddr => std_logic_vector(scan),
+      wdata => std_logic_vector(sum(15 downto 0)),
+      raddr => raddr,
+      rdata => high
     );
 
   p_scan : process (clk)
@@ -149,16 +162,12 @@ begin
   begin
     if rising_edge(clk) then
       index_q <= r_index;
-      if phase = 3 and have = '0' then
-        half                <= not first;
-        r_data(15 downto 0) <= rdata;
-      end if;
+      -- Read in phase 3, in which nothing is written.
       if phase = 0 and have = '0' then
-        have                 <= half;
-        r_data(31 downto 16) <= rdata;
+        have   <= not first;
+        r_data <= high & low;
       end if;
       if same = '0' or rst = '1' then
-        half <= '0';
         have <= '0';
       end if;
     end if;

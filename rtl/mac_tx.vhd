@@ -21,9 +21,10 @@
 --              and its bytes stay still. f_done(s) flips when the frame is over, f_result_s (from the same clock on) is
 --              0 sent, 1 given up after 16 collisions, 2 late collision, 3 given up after too long a deferral.
 --              collisions flips at each collision.
---   Upsets   : more than one state at a time: none instead, the frame is sent again from its beginning, recovered flips.
---              If only the slot waits whose turn it is not, it has its turn, and resynchronised flips: that happens only
---              if one of the two counts of turns was upset, as requests arrive in the order in which they were made.
+--   Upsets   : more than one state at a time: none instead, the frame is sent again from its beginning, recovered
+--              flips.
+--              If only the slot waits whose turn it is not, it has its turn, and resynchronised flips: that happens
+--              only if one of the two counts of turns was upset, as requests arrive in the order of their making.
 --              f_done(s) becomes f_request(s), not the other value of itself, so that no upset of either outlasts a
 --              frame. tick flips while there is a clock.
 --   Latency  : 2 clocks from a state to the pins; r_data is used one clock after r_addr

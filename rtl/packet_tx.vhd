@@ -5,7 +5,8 @@
 --               the peer's bank; then the payload, 1 .. 1472 bytes with p_last (ICMP: from frame byte 38 on, UDP: from
 --               42 on; ARP: none), with any gaps. The peer's bytes (0-5 MAC, 6-9 IP, 10-11 UDP port) stand still from
 --               s_start until s_ready
---   Abort     : s_abort: the frame being built is forgotten; what is requested stays. s_ready as usual, from the next clock on
+--   Abort     : s_abort: the frame being built is forgotten; what is requested stays. s_ready as usual from the next
+--               clock on
 --   Output    : the frame without padding and FCS, at slot & byte of ram_dc; then f_request of the slot flips. Slots
 --               take turns. IPv4 (RFC 791): id 0, do not fragment, TTL 64. UDP from port G_UDP_PORT, checksum 0 sent
 --               as 0xffff

@@ -3,8 +3,8 @@
 --   Clocks : clk for the engine and the stack, from 30 MHz on; mii_rx_clk and mii_tx_clk from the PHY, 25 or 2.5 MHz.
 --            The three are independent (constraints/)
 --   Reset  : arst_n, asynchronous, through a filter: a pulse that covers at most 15 edges of clk does nothing
---            (reset_filter). clk's reset makes those of the PHY's clocks, which end in step with them. So the engine and
---            the stack work without the clocks of the PHY; those may come, stop and go on at any time
+--            (reset_filter). clk's reset makes those of the PHY's clocks, which end in step with them. So the engine
+--            and the stack work without the clocks of the PHY; those may come, stop and go on at any time
 --   clock_missing: bit 0 mii_rx_clk, bit 1 mii_tx_clk: has been missing for 1 to 2 ms or longer
 --   Address: generics; straps are exclusive-ored into the last byte of MAC and IP address
 --   dbg_*  : for waves and tests; leave open

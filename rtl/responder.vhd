@@ -261,10 +261,10 @@ architecture rtl of responder is
   constant C_ST_ABORT  : std_logic_vector(4 downto 0) := "11101"; -- engine, buffers and session
   signal state : std_logic_vector(4 downto 0);
 
-  -- Reading the frame: byte hpos is on r_data while have = '1'.
+  -- Reading the frame: byte place (mod 64) is on r_data while have = '1'.
   signal pos       : unsigned(10 downto 0);
   signal have      : std_logic;
-  signal hpos      : unsigned(10 downto 0);
+  signal place      : unsigned(5 downto 0); -- of that byte, the lower bits
   signal scanning  : std_logic;
   signal word      : std_logic_vector(31 downto 0);
   signal word_next : std_logic_vector(31 downto 0); -- with the byte that is passing
@@ -284,6 +284,7 @@ architecture rtl of responder is
   signal code       : std_logic_vector(2 downto 0);
   signal silent     : std_logic; -- no reply
   signal end_pos    : unsigned(10 downto 0); -- frame byte behind the message
+  signal at_last    : std_logic; -- the byte that passes is the last one of the message
   signal words_over : std_logic;             -- the byte that passes is the last of the arguments
   signal index      : unsigned(15 downto 0); -- chunk or table word
   signal long_1     : std_logic; -- at least one word of arguments
@@ -294,7 +295,7 @@ architecture rtl of responder is
   -- Session.
   signal open_q      : std_logic;
   signal store      : std_logic; -- OPEN and READ: what the session's memory is to keep is in this frame
-  signal at_peer    : std_logic; -- byte hpos is the sender's MAC, IP or port
+  signal at_peer    : std_logic; -- byte place is the sender's MAC, IP or port
   signal at_head    : std_logic; -- .. of the message's header
   signal at_token   : std_logic;
   signal keep_we    : std_logic;
@@ -341,7 +342,7 @@ architecture rtl of responder is
   signal of_map      : std_logic; -- READ is for the tile in the map buffer
   signal read_tile   : unsigned(15 downto 0);
   signal read_next   : unsigned(15 downto 0);
-  signal read_left   : unsigned(15 downto 0);
+  signal read_left   : unsigned(15 downto 0); -- not (chunks to come): counts up
   signal keep        : std_logic_vector(15 downto 0);
   signal settle      : std_logic_vector(3 downto 0); -- f_ready may be that of an earlier question
   signal map_due    : std_logic;
@@ -422,7 +423,7 @@ begin
   scanning  <= to_bit(state = C_ST_HEADER or state = C_ST_WORDS or state = C_ST_ROWS or state = C_ST_PEER);
   r_addr    <= std_logic_vector(pos);
   word_next <= word(23 downto 0) & r_data;
-  word_full <= have and to_bit(hpos(1 downto 0) = 1); -- words begin at byte 6, 10, .., 42, .., 58, ..
+  word_full <= have and to_bit(place(1 downto 0) = 1); -- words begin at byte 6, 10, .., 42, .., 58, ..
 
   long_1     <= to_bit(end_pos >= C_ARGUMENTS + 4);
   long_start <= to_bit(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
@@ -430,7 +431,8 @@ begin
   long_list  <= to_bit(end_pos >= C_ARGUMENTS + 4 * 40) or (to_bit(end_pos >= C_ARGUMENTS + 4 * 32) and msg_type(0));
 
   -- pos is one ahead.
-  words_over <= to_bit(pos = end_pos) when msg_type = C_TABLE
+  at_last    <= to_bit(pos = end_pos);
+  words_over <= at_last when msg_type = C_TABLE
                 else to_bit(count = 20) when msg_type = C_START
                 else '1';
 
@@ -457,23 +459,23 @@ begin
   tile       <= std_logic_vector(last_tile);
 
   -- Sender's MAC, IP and port: bytes 6-11, 26-29, 34-35 of the frame, in ARP 22-27, 28-31; places 0-5, 6-9, 10-11.
-  at_peer    <= to_bit((hpos >= 6 and hpos < 12) or (hpos >= 26 and hpos < 30) or hpos = 34 or hpos = 35);
+  at_peer    <= to_bit((place >= 6 and place < 12) or (place >= 26 and place < 30) or place = 34 or place = 35);
   peer_data  <= r_data;
   peer_bank  <= store;
   peer_we    <= have and to_bit(state = C_ST_PEER) and at_peer when m_kind /= C_KIND_ARP
-                else have and to_bit(state = C_ST_PEER and hpos >= 22 and hpos < 32);
+                else have and to_bit(state = C_ST_PEER and place >= 22 and place < 32);
   -- All modulo 16.
-  peer_index <= std_logic_vector(hpos(3 downto 0) - 6) when m_kind = C_KIND_ARP or hpos < 16
-                else std_logic_vector(hpos(3 downto 0) + 8) when hpos(5) = '1'
-                else std_logic_vector(hpos(3 downto 0) - 4);
+  peer_index <= std_logic_vector(place(3 downto 0) - 6) when m_kind = C_KIND_ARP or place < 16
+                else std_logic_vector(place(3 downto 0) + 8) when place(5) = '1'
+                else std_logic_vector(place(3 downto 0) - 4);
 
   -- The session's memory ---------------------------------------------------------------------------------------------
   -- OPEN writes addresses and nonce, and the new token in place of its own header's; READ writes its header, and the
   -- rest as it is. OPEN is read up to its nonce, everything else up to the end of the header.
-  at_head   <= to_bit(hpos(5 downto 0) >= 42 and hpos(5 downto 0) < 58);
-  at_token  <= to_bit(hpos(5 downto 0) >= 46 and hpos(5 downto 0) < 50);
+  at_head   <= to_bit(place >= 42 and place < 58);
+  at_token  <= to_bit(place >= 46 and place < 50);
   keep_we   <= have and to_bit(state = C_ST_PEER) and store and (not at_head or not close_q or msg_type(3));
-  keep_data <= dice(7 downto 1) & (dice(0) or (not hpos(1) and hpos(0))) when at_token = '1' and msg_type(3) = '0'
+  keep_data <= dice(7 downto 1) & (dice(0) or (not place(1) and place(0))) when at_token = '1' and msg_type(3) = '0'
                else r_data;
   dice_next <= dice(31 downto 24) xor dice(30 downto 23) xor dice(29 downto 22) xor dice(9 downto 2);
   differs   <= to_bit(r_data /= kept);
@@ -484,7 +486,7 @@ begin
     port map (
       clk   => clk,
       we    => keep_we,
-      waddr => std_logic_vector(hpos(5 downto 0)),
+      waddr => std_logic_vector(place),
       wdata => keep_data,
       raddr => std_logic_vector(pos(5 downto 0)),
       rdata => kept
@@ -607,6 +609,14 @@ begin
     variable v_go      : std_logic;
     variable v_bad     : std_logic; -- counted, code 3
     variable v_recover : std_logic;
+    -- A register that is loaded or counted: what goes into its adder, and 1 if it counts.
+    variable v_pos        : unsigned(10 downto 0);
+    variable v_pos_inc    : unsigned(0 downto 0);
+    variable v_index      : unsigned(15 downto 0);
+    variable v_index_inc  : unsigned(0 downto 0);
+    variable v_next       : unsigned(15 downto 0);
+    variable v_left       : unsigned(15 downto 0);
+    variable v_packet_inc : unsigned(0 downto 0);
   begin
     if rising_edge(clk) then
       s_start     <= '0';
@@ -633,12 +643,16 @@ begin
       tx_abort    <= '0';
       v_recover   := '0';
       v_bad       := '0';
+      v_pos       := pos;
+      v_pos_inc(0) := scanning;
+      v_index     := index;
+      v_index_inc := "0";
+      v_next      := read_next;
+      v_left      := read_left;
+      v_packet_inc := "0";
 
       have <= scanning;
-      hpos <= pos;
-      if scanning = '1' then
-        pos <= pos + 1;
-      end if;
+      place <= pos(5 downto 0);
       settle <= '0' & settle(3 downto 1);
       if map_started = '1' then
         map_tile <= unsigned(run_tile);
@@ -659,7 +673,7 @@ begin
         if at_token = '1' then
           token_ok <= '0';
         end if;
-        if hpos >= C_ARGUMENTS then
+        if state = C_ST_WORDS then
           nonce_ok <= '0';
         end if;
       end if;
@@ -692,8 +706,8 @@ begin
         out_end    <= to_unsigned(C_STATUS_END, C_OUT_W);
         step       <= (others => '0');
         have       <= '0';
-        pos        <= to_unsigned(6, 11);
-        end_pos <= unsigned(m_length) + C_HEADER;
+        v_pos      := to_unsigned(6, 11);
+        end_pos    <= unsigned(m_length) + C_HEADER;
         if open_q = '1' and expired = '1' then
           events(23) <= '1';
           by_timer   <= '1';
@@ -710,7 +724,7 @@ begin
           store      <= '1';
           map_turn   <= '0';
           msg_type   <= C_MAP;
-          pos        <= to_unsigned(C_HEADER, 11);
+          v_pos      := to_unsigned(C_HEADER, 11);
           f_start    <= '1';
           s_start    <= '1';
           events(28) <= '1';
@@ -719,22 +733,22 @@ begin
 
       elsif state = C_ST_HEADER then
         if have = '1' then
-          if hpos = C_HEADER + 3 then
+          if place = C_HEADER + 3 then
             msg_type   <= r_data;
             magic_ok   <= to_bit(word_next(31 downto 16) = x"5053");
             version_ok <= to_bit(word_next(15 downto 8) = x"02");
-          elsif hpos = C_HEADER + 10 then
+          elsif place = C_HEADER + 10 then
             answer <= r_data(0);
-          elsif hpos = C_HEADER + 15 then
+          elsif place = C_HEADER + 15 then
             have  <= '0';
             state <= C_ST_DECIDE;
           end if;
         end if;
 
       elsif state = C_ST_DECIDE then
-        index     <= unsigned(word(15 downto 0));
+        v_index   := unsigned(word(15 downto 0));
         of_map    <= is_last;
-        pos       <= to_unsigned(C_ARGUMENTS, 11);
+        v_pos     := to_unsigned(C_ARGUMENTS, 11);
         state     <= C_ST_WAIT;
         v_go      := '0';
         heard     <= authentic;
@@ -788,7 +802,7 @@ begin
             if msg_type = C_READ and long_1 = '1' then
               read_active <= '0';
               read_tile   <= unsigned(word(31 downto 16));
-              read_next   <= unsigned(word(15 downto 0));
+              v_next      := unsigned(word(15 downto 0));
               store       <= '1';
             end if;
           elsif msg_type = C_TABLE then
@@ -808,7 +822,7 @@ begin
                 code <= C_NOT_READY;
               else
                 table_words <= (others => '0');
-                table_id    <= table_id + 1;
+                table_id    <= unsigned(word(31 downto 16)); -- + 1
                 state       <= C_ST_WORDS;
               end if;
             else
@@ -880,7 +894,7 @@ begin
               code       <= C_BUSY;
             end if;
           elsif msg_type = C_READ then
-            read_left   <= unsigned(word_next(31 downto 16));
+            v_left      := not unsigned(word_next(31 downto 16));
             read_active <= to_bit(unsigned(word_next(31 downto 16)) /= 0);
             settle      <= (others => '1');
             if of_map = '1' then
@@ -893,7 +907,7 @@ begin
               v_bad := '1';
             end if;
           elsif msg_type = C_TABLE then
-            index <= index + 1;
+            v_index_inc := "1";
             if index = table_words and table_words(13) = '0' then
               table_words <= table_words + 1;
             end if;
@@ -961,14 +975,14 @@ begin
         end if;
 
       elsif state = C_ST_ROWS then
-        if have = '1' and hpos = C_ARGUMENTS + C_WRITE_BYTES - 1 then
+        if have = '1' and at_last = '1' then
           have     <= '0';
           w_commit <= '1';
           state    <= C_ST_WAIT;
         end if;
 
       elsif state = C_ST_WAIT then
-        pos <= to_unsigned(6, 11);
+        v_pos := to_unsigned(6, 11);
         if silent = '1' then
           state <= C_ST_DONE;
         elsif s_ready = '1' then
@@ -976,21 +990,22 @@ begin
         end if;
 
       elsif state = C_ST_PEER then
-        if have = '1' and (hpos(5 downto 0) = 61 or (hpos(5 downto 0) = 57 and (store = '0' or msg_type(3) = '1'))) then
+        if have = '1' and (place = 61 or (place = 57 and (store = '0' or msg_type(3) = '1'))) then
           have       <= '0';
           s_start    <= '1';
           map_turn   <= '1';
-          pos        <= to_unsigned(C_HEADER, 11);
+          v_pos      := to_unsigned(C_HEADER, 11);
+          v_pos_inc  := "0";
           step       <= (others => '0');
           state      <= C_ST_FETCH;
           events(34) <= m_kind(1) and m_kind(0);
           if m_kind = C_KIND_ARP then
             state <= C_ST_DONE;
           elsif m_kind = C_KIND_ICMP then
-            pos     <= to_unsigned(38, 11);
+            v_pos   := to_unsigned(38, 11);
             end_pos <= unsigned(m_length) + 34;
           elsif m_kind = C_KIND_CLOSED then -- four zeros in place of bytes 10 to 13
-            pos      <= to_unsigned(10, 11);
+            v_pos    := to_unsigned(10, 11);
             end_pos  <= to_unsigned(42, 11);
             out_word <= to_unsigned(2, C_OUT_W);
             out_byte <= "11";
@@ -1006,8 +1021,8 @@ begin
 
       elsif state = C_ST_SHOW then
         if p_ready = '1' then
-          pos      <= pos + 1;
-          out_byte <= out_byte + 1;
+          v_pos_inc := "1";
+          out_byte  <= out_byte + 1;
           if out_byte = 3 then
             out_word <= out_word + 1;
           end if;
@@ -1034,10 +1049,9 @@ begin
 
       elsif state = C_ST_CELLS then
         if f_valid = '1' and p_ready = '1' and f_last = '1' then
-          read_next <= read_next + 1;
-          read_left <= read_left - 1;
+          v_packet_inc := "1";
           settle    <= (others => '1');
-          if read_left = 1 then
+          if read_left = 16#fffe# then
             read_active <= '0';
           end if;
           state <= C_ST_IDLE;
@@ -1087,6 +1101,11 @@ begin
         have       <= '0';
         state      <= C_ST_ABORT;
       end if;
+
+      pos       <= v_pos + v_pos_inc;
+      index     <= v_index + v_index_inc;
+      read_next <= v_next + v_packet_inc;
+      read_left <= v_left + v_packet_inc;
 
       -- Written last, and alone, so that they become resets of the flip-flops.
       if map_started = '1' then

@@ -192,7 +192,10 @@ check_crossings() {
 mapfile -t arbiter_files < <(sed 's/#.*//; s/[[:space:]]*$//; /^$/d; s|^|rtl/|; /arbiter/q' rtl/files.f)
 proof crossings check_crossings '' '' "${arbiter_files[*]}" \
   rtl/arbiter.vhd 'collisions past the synchroniser' \
-  's/collision_last <= collision_seen\(1\)/collision_last <= collisions(0)/' \
+  's/flips_last <= flips_seen/flips_last <= flips/' \
+  rtl/arbiter.vhd 'ticks past the synchroniser' 's/ticks_last <= ticks_q/ticks_last <= ticks/' \
+  rtl/mac_rx.vhd 'sending past the synchroniser' 's/own +<= synchronised\(0\)/own <= sending/' \
+  rtl/packet_tx.vhd 'reset of mac_tx past the synchroniser' 's/down +<= levels_q\(2\)/down <= tx_rst/' \
   rtl/mac_tx.vhd 'requests past the synchroniser' 's/synchronised\(4 downto 3\)/f_request/' \
   rtl/arbiter.vhd 'a gate before a synchroniser' 's/full_duplex => duplex_q/full_duplex => full_duplex/' \
   rtl/arbiter.vhd 'reset of another clock' 's/rst +=> tx_rst/rst => rst/'

@@ -113,13 +113,16 @@ TEST_CASE("phy: frames of the chip that come back to it in half duplex are not r
   INFO("echo after " << s.echo << " nibbles");
   Bench b(s);
   REQUIRE(b.station.resolve(3));
-  for (size_t size = 0; size < 40; ++size) CHECK(b.station.ping(size * 30));
+  for (size_t size = 0; size < 20; ++size) {
+    CHECK(b.station.ping(size * 70));
+    b.desk.run_for(kMillisecond);  // more often the chip does not answer a stranger
+  }
   const auto counters = b.counters();
   for (const net::Counter none : {net::kRxFiltered, net::kRxOther, net::kBadSource, net::kAnswers, net::kRxShort,
                                   net::kRxFcs, net::kRxAlign, net::kRxFragment})
     CHECK(counters[static_cast<size_t>(none)] == 0);
-  CHECK(counters[net::kTxFrames] == 41);
-  CHECK(counters[net::kRxFrames] == 42);
+  CHECK(counters[net::kTxFrames] == 21);
+  CHECK(counters[net::kRxFrames] == 22);
 }
 
 TEST_CASE("phy: carrier sense stuck in half duplex gives frames up, and ends with the fault") {

@@ -247,7 +247,7 @@ void repair_content(Bytes& f) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("packet_rx: every length of UDP and ICMP, with and without checksum; broadcasts are ARP alone", "",
+TEMPLATE_TEST_CASE("packet_rx: every length of UDP and ICMP, with and without checksum, broadcasts are ARP alone", "",
                    Vpacket_rx_2, Vpacket_rx_4) {
   auto bench = std::make_unique<Bench<TestType>>();
   for (size_t size = 0; size <= 1472; ++size) {
