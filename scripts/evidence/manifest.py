@@ -37,7 +37,7 @@ KINDS: tuple[Kind, ...] = (
           "sw/scene/**", "scripts/mutants/**", "scripts/mutants_equivalent.txt"),
          60, "build/evidence/mutants.json", speaks_for_itself=True, takes_a_copy=True,
          goes_on="mutant by mutant, also after edits: build/mutants/results.jsonl"),
-    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/flips/**", "scripts/flips_chip.sh"), 15, "build/flips_chip.txt"),
+    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/flips/**", "scripts/flips_chip.py"), 15, "build/flips_chip.txt"),
     Kind("flips", ("flips",), (*ENGINE, "tb/flips/flips.cpp", "tb/flips/inject.pl", "scripts/flips.sh"), 2,
          "build/flips.txt"),
     Kind("soak", ("soak",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/soak.sh"), 4),

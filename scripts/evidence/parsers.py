@@ -72,20 +72,24 @@ def flips(text: str) -> Results:
 
 
 def flips_chip(text: str) -> Results:
-    """Tables '<what>, 34 columns wide> <number> ..' under a head 'upset in ..'; those of several parts are added up."""
+    """Rows '<what> <number> ..' under a head 'upset in ..', then the registers of those that went wrong."""
     columns: list[str] = []
     rows: dict[str, dict[str, int]] = {}
     for line in text.splitlines():
         if line.startswith("upset in "):
-            columns = line[34:].split()
-        elif columns and (m := re.fullmatch(r"(.{34,}?)((?: +\d+){%d})" % len(columns), line)):
-            row = rows.setdefault(m[1].strip(), dict.fromkeys(columns, 0))
-            for name, value in zip(columns, map(int, m[2].split())):
-                row[name] = max(row[name], value) if name == "clocks" else row[name] + value
+            columns = line.split()[2:]
+        elif columns and (m := re.fullmatch(r"(.+?)((?:\s+\d+){%d})" % len(columns), line)):
+            rows.setdefault(m[1].strip(), dict(zip(columns, map(int, m[2].split()))))
     whole = rows.pop("all", None)
     _need(whole and whole.get("flips"), "upsets")
-    sites = re.findall(r"^((?:error|silent|hang): [^;\n]*)", text, re.M)
-    return {"columns": columns, "rows": rows, "all": whole, "sites": sites}
+    sites: dict[str, dict[str, int]] = {"hang": {}, "silent": {}, "error": {}}
+    for m in re.finditer(r"^(hang|silent|error): (\S+) (\S+): (.*?)(?:; again: .*)?$", text, re.M):
+        bits = [re.search(r"\((\d+) times\)", bit) for bit in m[4].split(", ")]
+        # Those of the engine, whose own campaign is finer, are only counted.
+        name = "the engine" if m[3].startswith("u_engine.") else f"`{m[3].replace('u_arbiter.', '')}`"
+        sites[m[1]][name] = sites[m[1]].get(name, 0) + sum(int(b[1]) if b else 1 for b in bits)
+    about = re.search(r"^flips_chip: (\d+ registers; .*)$", text, re.M)
+    return {"about": about[1] if about else "", "columns": columns, "rows": rows, "all": whole, "sites": sites}
 
 
 _SOAK = re.compile(

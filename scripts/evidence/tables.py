@@ -93,15 +93,16 @@ def _chip_verdict(r: dict[str, Any]) -> str:
 
 @simple("flips-chip")
 def flips_chip(r: dict[str, Any]) -> str:
-    names = {"clocks": "worst clocks"}
+    names = {"resent": "of the masked: resent"}
     text = table(["upset in", *(names.get(c, c) for c in r["columns"])],
                  [[name, *(row[c] for c in r["columns"])] for name, row in [*r["rows"].items(), ("**all**", r["all"])]])
-    for kind, title in (("hang", "Hung, register and bits (times):"),
-                        ("silent", "Silently wrong, register and bits (times):"),
-                        ("error", "Reported as an error, register and bits (times):")):
-        found = [site.removeprefix(f"{kind}: ") for site in r["sites"] if site.startswith(f"{kind}: ")]
-        if found:
-            text += f"\n\n{title}\n" + "\n".join(wrapped(f"- {site}", 120, "  ") for site in found)
+    if r["about"]:
+        text += "\n\n" + wrapped(r["about"][0].upper() + r["about"][1:] + ".")
+    for kind, title in (("hang", "Hung"), ("silent", "Silently wrong"), ("error", "Reported as an error")):
+        if r["sites"][kind]:
+            found = sorted(r["sites"][kind].items(), key=lambda pair: (pair[0] == "the engine", pair[0]))
+            text += "\n\n" + wrapped(f"{title}, by register, with the number of upsets: "
+                                     + ", ".join(f"{name} {n}" for name, n in found) + ".")
     return text
 
 

@@ -184,7 +184,8 @@ class Campaign:
                 if not job.make(test, log, 600):
                     verdict = INVALID
                 else:
-                    code, _ = job.try_(test, log, 20 + 3 * seconds)
+                    limit = 60 + 4 * seconds if test.thorough else 20 + 3 * seconds
+                    code, _ = job.try_(test, log, limit)
                     if code is None:
                         verdict = NO_END
                     elif code in (126, 127):

@@ -73,8 +73,8 @@ _CHIP_LAST = (
     _ctest("replay of the chip odd", "^replay: chip_odd,", ("record_chip", "psweep_top_replay"),
            ("tb/replay/record_chip.cpp",), "psweep_top"),
 )
-# Tests of the link alone, of the forecast and of speed; and those above.
-_NOT_OF_THE_CHIP = {"test_link", "test_goodput", "test_link_plan_chip", "test_fuzz", "test_chip"}
+# Tests of the link alone, of the forecast, of speed and of the host; and those above.
+_NOT_OF_THE_CHIP = {"test_link", "test_goodput", "test_link_plan_chip", "test_host", "test_fuzz", "test_chip"}
 # Packages, and what has its test elsewhere.
 _OWN = {"psweep_pkg": ("address_generator", "ram_deep", "ram_2r", "storage", "updating"),
         "eth_pkg": ("mac_rx", "mac_tx", "packet_rx")}

@@ -170,16 +170,18 @@ class Results(unittest.TestCase):
             parsers.flips("flips: FAILED\n")
 
     def test_flips_chip(self) -> None:
-        head = f"{'upset in':34} {'flips':>7} {'masked':>8} {'silent':>8} {'hang':>8} {'clocks':>8}\n"
-        rows = "".join(f"{name:34} {9:>7} {8:>8} {1:>8} {0:>8} {77:>8}\n" for name in ("responder, state", "all"))
-        sites = "silent: responder, state: 3 4(2); again: --only 1:2:3\n"
-        found = parsers.flips_chip(head + rows + sites + head + rows)
-        self.assertEqual(found["rows"]["responder, state"],
-                         {"flips": 18, "masked": 16, "silent": 2, "hang": 0, "clocks": 77})
-        self.assertEqual(found["sites"], ["silent: responder, state: 3 4(2)"])
-        self.assertIn("- responder, state: 3 4(2)", tables.flips_chip(found))
+        text = (f"flips_chip: 210 registers; without an upset: 9 clocks\n{'upset in':<38} {'flips':>6} {'masked':>8} "
+                f"{'silent':>8} {'hang':>8} {'clocks':>7}\n")
+        text += "".join(f"{name:<38} {9:>6} {8:>8} {1:>8} {0:>8} {77:>7}\n" for name in ("mac_tx, slot 2", "all"))
+        text += ("silent: row_buffer u_arbiter.u_row_buffer.used: 3, 4 (2 times); again: x --only 1:2:3\n"
+                 "silent: similarity u_engine.s8: 0; again: x --only 1:2:3\nflips_chip: nothing hangs\n")
+        found = parsers.flips_chip(text)
+        self.assertEqual(found["rows"]["mac_tx, slot 2"],
+                         {"flips": 9, "masked": 8, "silent": 1, "hang": 0, "clocks": 77})
+        self.assertEqual(found["sites"]["silent"], {"`u_row_buffer.used`": 3, "the engine": 1})
+        self.assertIn("`u_row_buffer.used` 3, the engine 1.", tables.flips_chip(found))
         with self.assertRaises(parsers.NothingFound):
-            parsers.flips_chip(head)
+            parsers.flips_chip("flips_chip: FAILED\n")
 
     def test_soak(self) -> None:
         text = ("soak: tiny: aborts and resets in idle 1, load 2, sweep 3, flush 4, unload 5\n"
