@@ -212,15 +212,20 @@ def table_families(base):
     return markdown(["", "family", "LUT", "FF", "RAM", "DSP", "carry", "SRL", "LUT RAM or RF"], rows)
 
 
+# Engines whose longest paths are told: one, two and four lanes.
+LEVELS = ("bands", "tile", "tile_2", "tile_4")
+
+
 def table_levels(base):
     rows = []
-    for family in ("xc6v", "xc5v"):
-        found = flat(base, "bands", family)["levels"]["by_unit"]
+    for name, family in (("bands", "xc6v"), ("bands", "xc5v"), *((name, "xc6v") for name in LEVELS if name != "bands")):
+        found = flat(base, name, family)["levels"]["by_unit"]
         for unit in PAPER_UNITS:
             path = found[unit]
-            rows.append([f"{unit}", family, f"**{path['lut']}**" if path["lut"] > 5 else path["lut"], path["carry"],
+            rows.append([POINTS[name]["title"].split(" (")[0], family, f"{unit}",
+                         f"**{path['lut']}**" if path["lut"] > 5 else path["lut"], path["carry"],
                          f"`{tidy(path['start'])}`", f"`{tidy(path['end'])}`"])
-    return markdown(["unit of the end", "family", "LUTs", "carry", "from", "to"], rows)
+    return markdown(["engine", "family", "unit of the end", "LUTs", "carry", "from", "to"], rows)
 
 
 def tidy(name):
@@ -337,9 +342,12 @@ def table_targets(base):
         f"{c['lut']:,} LUT ({shares[0]:.0%}), {num(c['ram36_equivalent'])} RAMB36 ({shares[1]:.0%}), {c['dsp']} DSP "
         f"({shares[2]:.0%}), {mega(frame['clocks'])} M clocks".replace("%", " %"),
         max(shares) <= 0.6 and frame["clocks"] <= 115e6)
-    worst = flat(base, "bands")["levels"]["longest"]["lut"]
-    over = [u for u, p in flat(base, "bands")["levels"]["by_unit"].items() if p["lut"] > 5]
-    row("LUTs on a path, xc6v", "5", f"{worst}" + (": " + ", ".join(over) if over else ""), worst <= 5)
+    for name in LEVELS:
+        levels = flat(base, name)["levels"]
+        worst = levels["longest"]["lut"]
+        over = [u for u, p in levels["by_unit"].items() if p["lut"] > 5]
+        row(f"LUTs on a path, xc6v, {POINTS[name]['title'].split(':')[0].split(' (')[0]}", "5",
+            f"{worst}" + (": " + ", ".join(over) if over else ""), worst <= 5)
     for name, (title, _) in PNR.items():
         two = base.get("pnr", {}).get(name)
         if two and "two lanes" in title:
