@@ -789,7 +789,7 @@ FAULTS = (
      'return [RTL / f for f in files if f != "divider.vhd"]', "differ from rtl/files.f"),
     ("sources", "scripts/cmake/RtlModel.cmake", "list(APPEND sources ${CMAKE_SOURCE_DIR}/rtl/${line})",
      "list(INSERT sources 0 ${CMAKE_SOURCE_DIR}/rtl/${line})", "CMake: files of"),
-    ("analyse", "rtl/files.f", "divider.vhd\nsimilarity.vhd\n", "similarity.vhd\ndivider.vhd\n", "divider"),
+    ("analyse", "rtl/files.f", "divider_mul.vhd\nsimilarity.vhd\n", "similarity.vhd\ndivider_mul.vhd\n", "divider_mul"),
     ("analyse", "tb/configs/tile.json", '"window": 13', '"window": 12', "GHDL ends with 1"),
     ("generics", "rtl/psweep_top.core", "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 2}",
      "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 4}", "parameters differ from the VHDL"),
