@@ -15,7 +15,8 @@
 --              that ends before or after its last beat, and a word of table or offsets that is not what was written
 --              drop the tile a clock later (error bit 'upset'). Sets are counted to 'not below', so that no upset makes
 --              a tile longer than the largest of the build
---   Counters : saturating, tiles_dropped and error_count a clock behind their event; clear also resets the latch that counts window errors once a tile. tile_clocks is kept
+--   Counters : saturating, tiles_dropped and error_count a clock behind their event; clear also resets the latch that
+--              counts window errors once a tile. tile_clocks is kept
 --   Reset    : idle, sizes missing, table empty, counters 0; bounds are not reset: write them before the first start
 --   Golden   : sw/golden/control.hpp
 library ieee;
