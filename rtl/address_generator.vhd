@@ -81,7 +81,7 @@ entity address_generator is
     m_usable_x       : out std_logic;
     m_usable_y       : out std_logic;
     m_window_error   : out std_logic; -- inside both images, not loaded in at least one; only with m_valid
-    m_word_error     : out std_logic  -- a row has read a word with wrong parity; C_ROW_MIN clocks behind its strobe at most
+    m_word_error     : out std_logic  -- a row has read a word with wrong parity; within C_ROW_MIN clocks of its strobe
   );
 end entity address_generator;
 
@@ -356,7 +356,8 @@ begin
   end process p_word_error;
 
   -- Start values -----------------------------------------------------------------------------------------------------
-  base        <= y_older when (row(2) = '1' or row(3) = '1') and s_plane_first = '0' else unsigned(offset_word(31 downto 0));
+  base        <= y_older when (row(2) = '1' or row(3) = '1') and s_plane_first = '0'
+                 else unsigned(offset_word(31 downto 0));
   start_value <= unsigned(table_word(31 downto 0)) + base;
 
   p_start : process (clk)

@@ -15,7 +15,8 @@
 --              that ends before or after its last beat, and a word of table or offsets that is not what was written
 --              drop the tile a clock later (error bit 'upset'). Sets are counted to 'not below', so that no upset makes
 --              a tile longer than the largest of the build
---   Counters : saturating, tiles_dropped and error_count a clock behind their event; clear also resets the latch that counts window errors once a tile. tile_clocks is kept
+--   Counters : saturating, tiles_dropped and error_count a clock behind their event; clear also resets the latch that
+--              counts window errors once a tile. tile_clocks is kept
 --   Reset    : idle, sizes missing, table empty, counters 0; bounds are not reset: write them before the first start
 --   Golden   : sw/golden/control.hpp
 library ieee;
@@ -205,9 +206,9 @@ architecture rtl of control is
   signal last_col_less_1 : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
   signal last_row_less_1 : unsigned(C_ROW_W - 1 downto 0);
   signal one_col     : std_logic; -- rows of one pixel
-  signal one_row     : std_logic; -- a single row
   signal at_col_end  : std_logic;
   signal at_row_end  : std_logic;
+  signal at_row_last : std_logic; -- last sample of a row, in a sweep
   signal at_last     : std_logic; -- last pixel of the window, or last clock of the plane
   signal at_tile_end : std_logic;
   signal step        : std_logic;
@@ -510,10 +511,12 @@ begin
   -- Only windows below C_ROW_MIN can have rows that need padding.
   g_padding : if G_WINDOW < C_ROW_MIN generate
     row_last_col <= sweep_last_col when sweep_last_col >= C_ROW_MIN - 1 else to_unsigned(C_ROW_MIN - 1, C_COL_W);
+    at_row_last <= to_bit(col = sweep_last_col);
   end generate g_padding;
 
   g_no_padding : if G_WINDOW >= C_ROW_MIN generate
     row_last_col <= sweep_last_col;
+    at_row_last <= at_col_end;
   end generate g_no_padding;
 
   -- Sequence ---------------------------------------------------------------------------------------------------------
@@ -533,7 +536,7 @@ begin
   load_done   <= pix_fire and at_last and s_pix_tlast;
   event_short <= pix_fire and s_pix_tlast and not at_last;
   event_long  <= pix_fire and at_last and not s_pix_tlast;
-  sample_last <= active and at_row_end and to_bit(col = sweep_last_col);
+  sample_last <= active and at_row_end and at_row_last;
   flushed     <= is_flush and to_bit(since_last = C_FLUSH);
   tile_done   <= is_unload and map_last and not map_more;
   -- What cannot be unless a bit was upset: a state without a name, a map that ends before or after its last beat, or a
@@ -593,10 +596,10 @@ begin
       if step = '1' then
         if at_col_end = '1' then
           col        <= (others => '0');
-          at_col_end <= one_col;
+          at_col_end <= one_col and not at_row_end;
           if at_row_end = '1' then
             row        <= (others => '0');
-            at_row_end <= one_row;
+            at_row_end <= '0'; -- of a plane to come: it has at least three rows
           else
             row        <= row + 1;
             at_row_end <= to_bit(row = last_row_less_1);
@@ -613,14 +616,10 @@ begin
       end if;
       if is_idle = '1' then
         one_col    <= to_bit(win_last_col_q = 0);
-        one_row    <= to_bit(win_last_row_q = 0);
         at_col_end <= to_bit(win_last_col_q = 0);
         at_row_end <= to_bit(win_last_row_q = 0);
       elsif load_done = '1' then
         one_col    <= '0';
-        one_row    <= '0';
-        at_col_end <= '0';
-        at_row_end <= '0';
       end if;
       at_set_end_q <= at_set_end; -- a set takes many clocks
       if is_sweep = '1' and at_last = '1' then
@@ -645,7 +644,7 @@ begin
         active <= '1';
       elsif is_sweep = '1' and at_col_end = '1' then
         active <= not at_tile_end;
-      elsif col = sweep_last_col then
+      elsif at_row_last = '1' then
         active <= '0';
       end if;
 
@@ -700,16 +699,24 @@ begin
   -- Counted a clock later: the address generator's tests lie before them. In the clock after an abort it still shows a
   -- sample of the tile.
   p_window : process (clk)
-    variable v_count : unsigned(2 downto 0);
+    -- Of the lanes: an odd number, one at least, two at least, four.
+    variable v_odd  : std_logic;
+    variable v_one  : std_logic;
+    variable v_two  : std_logic;
+    variable v_four : std_logic;
   begin
     if rising_edge(clk) then
-      v_count := (others => '0');
+      v_odd  := '0';
+      v_one  := '0';
+      v_two  := '0';
+      v_four := to_bit(G_LANES = 4);
       for n in 0 to G_LANES - 1 loop
-        if window_error(n) = '1' then
-          v_count := v_count + 1;
-        end if;
+        v_odd  := v_odd xor window_error(n);
+        v_two  := v_two or (v_one and window_error(n));
+        v_one  := v_one or window_error(n);
+        v_four := v_four and window_error(n);
       end loop;
-      samples_lost <= v_count;
+      samples_lost <= v_four & (v_two and not v_four) & v_odd;
       if rst = '1' or abort_q = '1' then
         samples_lost <= (others => '0');
       end if;

@@ -158,7 +158,8 @@ for lanes in 1 2; do
   proof $name control "-gG_IMG_COLS=6 -gG_IMG_ROWS=4 -gG_PLANE_COLS=2 -gG_PLANE_ROWS=2 -gG_PLANES=3 -gG_WINDOW=3 \
 -gG_MNCC_W=4 -gG_LANES=$lanes -gG_LATENCY=5" \
     'tile_done tile_drop' 'rtl/psweep_pkg.vhd rtl/control.vhd' \
-    rtl/control.vhd 'start with a table too short' "s/if config_bad = '1' or table_bad = '1' then/if config_bad = '1' then/" \
+    rtl/control.vhd 'start with a table too short' \
+    "s/if config_bad = '1' or table_bad = '1' then/if config_bad = '1' then/" \
     rtl/control.vhd 'a tile too wide allowed' 's/to_unsigned\(G_PLANE_COLS, 16\)/to_unsigned(G_PLANE_COLS + 1, 16)/' \
     rtl/control.vhd 'a set too many' 's/plane_set >= last_set or/plane_set > last_set or/' \
     rtl/control.vhd 'a short row' 's/to_unsigned\(C_ROW_MIN - 1, C_COL_W\)/to_unsigned(C_ROW_MIN - 2, C_COL_W)/' \

@@ -25,7 +25,8 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
               .m_valid(m_valid), .m_row_first(m_row_first), .m_plane_first(m_plane_first),
               .m_plane_last(m_plane_last), .m_plane(m_plane), .m_lanes(m_lanes),
               .map_start(map_start), .map_unload(map_unload), .map_abort(map_abort),
-              .map_more(map_more), .map_valid(map_valid), .map_last(map_last), .window_error(window_error), .word_error(word_error),
+              .map_more(map_more), .map_valid(map_valid), .map_last(map_last), .window_error(window_error),
+              .word_error(word_error),
               .state(state), .errors(errors), .tile_done(tile_done), .tile_drop(tile_drop));
 
   localparam IDLE = 0, LOAD = 1, SWEEP = 2, FLUSH = 3, UNLOAD = 4, DRAIN = 5;
