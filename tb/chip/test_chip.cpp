@@ -187,6 +187,7 @@ TEST_CASE("chip: ARP, ping of all sizes, addresses by straps, both speeds") {
   for (size_t size = 0; size <= 1468; size += fast && (size < 40 || size > 1440) ? 1 : fast ? 29 : 367) {
     INFO("size " << size << (fast ? ", 100" : ", 10") << " Mbit/s");
     CHECK(b.station.ping(size, 5 * kMillisecond));
+    if (fast) b.desk.run_for(kMillisecond);  // strangers are answered once a millisecond
   }
   CHECK(b.desk.link().violations() == 0);
   CHECK(b.station.dropped() == 0);
@@ -903,7 +904,11 @@ TEST_CASE("chip: a transmitter that stands still or finds no gap does not hold t
   const uint32_t next = crowd.open(kHost);
   CHECK(next != token);
   CHECK(crowd.flags(kHost, next) & net::kFlagSession);
-  CHECK(crowd.counter(net::kRecovered) >= 1);
+  if (carrier) {  // mac_tx gives the frames up before the watchdog has to
+    CHECK(crowd.counter(net::kTxDeferred) >= 4);
+  } else {
+    CHECK(crowd.counter(net::kRecovered) >= 1);
+  }
   CHECK(b.desk.link().violations() == 0);
 }
 
