@@ -600,7 +600,8 @@ TEST_CASE("chip: who watches his own tokens cannot close another's session") {
       for (const net::Address& from : {kOther, kHost}) crowd.send(from, request(net::kClose, guess));
     }
   }
-  b.desk.run_until([&] { return b.desk.waiting() == 0; }, b.desk.now() + 100 * kMillisecond);
+  b.desk.run_for(10 * kMicrosecond);
+  REQUIRE(b.desk.run_until([&] { return b.desk.waiting() == 0; }, b.desk.now() + 100 * kMillisecond));
   b.desk.run_for(100 * kMicrosecond);
   crowd.frames.clear();
   CHECK_FALSE(predicted);
@@ -624,7 +625,7 @@ TEST_CASE("chip: a session belongs to who opened it; wrong tokens and strangers 
     CHECK(net::get32(reply, 4) == net::get32(m, 4));
   };
   net::Address ip = kHost, port = kHost, mac = kHost;
-  ++ip.ip, ++port.port, ++mac.mac[5];
+  ip.ip += 0x100, ++port.port, ++mac.mac[5];
   for (const net::Address& stranger : {ip, port, mac}) refused(stranger, request(net::kStatus, token));
   refused(kHost, request(net::kStatus, token + 1));
   refused(kHost, request(net::kStatus, token ^ 0x80000000));
@@ -903,7 +904,8 @@ TEST_CASE("chip: a transmitter that stands still or finds no gap does not hold t
   const uint32_t next = crowd.open(kHost);
   CHECK(next != token);
   CHECK(crowd.flags(kHost, next) & net::kFlagSession);
-  CHECK(crowd.counter(net::kRecovered) >= 1);
+  // Without a clock the chip is stuck; a carrier that does not end the transmitter gives up by itself.
+  CHECK(crowd.counter(carrier ? net::kTxDeferred : net::kRecovered) >= 1);
   CHECK(b.desk.link().violations() == 0);
 }
 
