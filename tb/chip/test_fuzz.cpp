@@ -249,6 +249,11 @@ class Fuzz {
     const double first = std::ceil((now + from - phase) / ms) * ms + phase;  // tick at or after `from`
     if (first <= now + to) run_clocks(first - (now + from) + 1);
   }
+  bool tick_within(double clocks) const {
+    const double ms = config_.clk_khz, phase = static_cast<double>(desk_->released()) + 5;
+    const double now = static_cast<double>(desk_->clocks());
+    return std::ceil((now - 2000 - phase) / ms) * ms + phase <= now + clocks;
+  }
   // Waits for answers that are allowed again.
   void need(golden::Arbiter::Bucket bucket, int count = 1) {
     if (model_.left(bucket) >= count) return;
@@ -302,7 +307,8 @@ class Fuzz {
     // On the wire, in the responder, and its reply: of a ping as long, of a READ some map packets.
     const bool udp = frame.size() > 46 && frame[23] == net::kProtocolUdp;
     const bool read = udp && frame[45] == net::kRead;
-    rest((udp ? 3.5 : 12.5) * static_cast<double>(frame.size()) + (read ? 6.0 * 4 * config_.chunk_bytes : 0.0) + 4500);
+    rest((udp ? 3.5 : 12.5) * static_cast<double>(frame.size()) + (read ? 6.0 * 4 * config_.chunk_bytes : 0.0) +
+         (tick_within(8000) ? 4500 : 1300));
     latest_.clear();
     transmit(std::move(frame), cut, bad);
     step();
@@ -792,6 +798,9 @@ class Fuzz {
 
   void one() {
     if (model_.sweeping() && one_in(6)) return say(message(net::kClose));
+    // Until none is answered.
+    if (one_in(500))
+      for (int i = 0; i <= net::kBucketAnswers + 1; ++i) say(message(net::kOpen, 0, 0, number(1)));
     const int kind = below(100);
     // With both ends sending, a chip in half duplex would see collisions that the model does not know.
     if (kind == 0 && model_.full_duplex()) return burst();
@@ -802,7 +811,9 @@ class Fuzz {
       f = net::make_icmp_echo(hosts_[below(3)], own_, 8, noise(static_cast<size_t>(4 + below(one_in(8) ? 1460 : 60))));
     } else {
       const Bytes m = kind < 68 ? next_message() : wrong_message();
-      net::Address from = hosts_[static_cast<size_t>(one_in(8) ? below(3) : speaker())], to = own_;
+      net::Address
+          from = hosts_[static_cast<size_t>(one_in(m.size() > 3 && m[3] == net::kOpen ? 2 : 8) ? below(3) : speaker())],
+          to = own_;
       if (one_in(30)) to.port = static_cast<uint16_t>(one_in(2) ? any() : to.port ^ (1u << below(16)));
       if (one_in(40)) {
         const uint32_t bad[] = {0, 0x00ffffff, 0x7f000001, 0xe0000001, 0xefffffff, 0xf0000000, 0xffffffff, own_.ip};
@@ -838,6 +849,10 @@ class Fuzz {
     std::vector<bool> arp;
     using Bucket = golden::Arbiter::Bucket;
     // As many as are answered; less than full, so that a tick meanwhile is not lost.
+    if (one_in(4) || classes_["burst: answered"] == 0) {
+      need(Bucket::kArp, 3);
+      need(Bucket::kOther, 6);
+    }
     if (model_.left(Bucket::kArp) < 3 || model_.left(Bucket::kOther) < 6) return;
     if (model_.left(Bucket::kArp) == net::kBucketAnswers) put(net::make_arp_request(hosts_[0], own_.ip));
     if (model_.left(Bucket::kOther) == net::kBucketAnswers) put(net::make_icmp_echo(hosts_[0], own_, 8, noise(8)));
