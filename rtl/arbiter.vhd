@@ -213,6 +213,7 @@ architecture rtl of arbiter is
   signal flips_seen     : std_logic_vector(2 downto 0);
   signal flips_last     : std_logic_vector(2 downto 0);
   signal flipped        : std_logic_vector(2 downto 0);
+  signal tx_down        : std_logic;
   signal f_request      : std_logic_vector(1 downto 0);
   signal f_length_0     : std_logic_vector(10 downto 0);
   signal f_length_1     : std_logic_vector(10 downto 0);
@@ -466,7 +467,8 @@ begin
       q   => flips_seen
     );
 
-  flipped <= flips_seen xor flips_last;
+  -- In its reset mac_tx lays them down, wherever they were.
+  flipped <= (flips_seen xor flips_last) and not (tx_down & tx_down & tx_down);
 
   p_flips : process (clk)
   begin
@@ -536,6 +538,7 @@ begin
       ram_waddr    => frame_waddr,
       ram_wdata    => frame_wdata,
       tx_rst       => tx_rst,
+      tx_down      => tx_down,
       f_request    => f_request,
       f_length_0   => f_length_0,
       f_length_1   => f_length_1,

@@ -64,6 +64,7 @@ entity packet_tx is
     ram_wdata : out std_logic_vector(7 downto 0);
 
     tx_rst     : in  std_logic; -- of tx_clk
+    tx_down    : out std_logic; -- the same, as it is seen here
     f_request  : out std_logic_vector(1 downto 0);
     f_length_0 : out std_logic_vector(10 downto 0);
     f_length_1 : out std_logic_vector(10 downto 0);
@@ -410,9 +411,10 @@ begin
       q   => levels_q
     );
 
-  down   <= levels_q(2);
-  done   <= levels_q(1 downto 0);
-  change <= done xor done_seen;
+  down    <= levels_q(2);
+  tx_down <= down;
+  done    <= levels_q(1 downto 0);
+  change  <= done xor done_seen;
   result <= f_result_0 when change(0) = '1' else
             f_result_1;
 

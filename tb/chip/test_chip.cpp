@@ -912,8 +912,11 @@ TEST_CASE("chip: a transmitter that stands still or finds no gap does not hold t
   const uint32_t next = crowd.open(kHost);
   CHECK(next != token);
   CHECK(crowd.flags(kHost, next) & net::kFlagSession);
-  // Without a clock the chip is stuck; a carrier that does not end the transmitter gives up by itself.
-  CHECK(crowd.counter(carrier ? net::kTxDeferred : net::kRecovered) >= 1);
+  if (carrier) {  // mac_tx gives the frames up before the watchdog has to
+    CHECK(crowd.counter(net::kTxDeferred) >= 4);
+  } else {
+    CHECK(crowd.counter(net::kRecovered) >= 1);
+  }
   CHECK(b.desk.link().violations() == 0);
 }
 
