@@ -499,9 +499,10 @@ class Pump {
     }
     if (!d.checked && d.known == d.there.size() / 2) ask(kStatus);  // so that the answer is there at the end
     if (m.order != read_order_) return;
-    // The range is over, or half of the ring can be freed: on with what is missing.
+    // The range is over, or half of the ring can be freed for more: on with what is missing.
     if (uint32_t{m.index} + 1 == read_end_ ||
-        (ring() && d.missing >= read_began_ + std::max(1u, (read_end_ - read_began_) / 2))) {
+        (ring() && read_end_ < d.there.size() &&
+         d.missing >= read_began_ + std::max(1u, (read_end_ - read_began_) / 2))) {
       send_read(d.missing < d.highest);
     }
   }

@@ -26,8 +26,9 @@ constexpr double kLeastPause = 1e-3, kMostPause = 0.25;  // of the host, link_en
 constexpr uint32_t kAnswerEvery = 8;                     // likewise
 
 // Clocks of the chip's parts (headers of rtl/responder.vhd, packet_tx.vhd and scheduler.vhd).
-constexpr int kHeaderClocks = 40;    // a message until it is obeyed
-constexpr int kPeerClocks = 40;      // who asked, before a reply
+constexpr int kHeaderClocks = 62;    // a message until it is obeyed: whose it is, too
+constexpr int kDivideClocks = 26;    // START: its chunks against its pixels
+constexpr int kPeerClocks = 62;      // who asked, before a reply
 constexpr int kReplyByteClocks = 6;  // a byte of a reply or of a map packet's header
 constexpr int kFrameClocks = 170;    // headers and checksums, when the payload is there
 constexpr int kBaseByte = 16;        // of a reply: from here on the status block stands still
@@ -235,7 +236,8 @@ class Simulation {
       responding_ = true;
       const Message m = inbox_.front();
       const bool rows = m.type == net::kWrite;
-      agenda_.after(clk(kHeaderClocks + (rows ? c_.chunk_bytes : 0)), [this, m] { obey(m); });
+      agenda_.after(clk(kHeaderClocks + (rows ? c_.chunk_bytes : 0) + (m.type == net::kStart ? kDivideClocks : 0)),
+                    [this, m] { obey(m); });
     } else if (map_due && frames_ < 2) {
       map_turn_ = false;
       responding_ = true;
@@ -524,8 +526,8 @@ class Simulation {
     }
     if (!checked_ && down_missing_ == total / 2) ask(message(net::kStatus));
     if (order != read_order_) return;
-    if (chunk + 1 == read_end_ ||
-        (ring_ > 0 && down_missing_ >= read_began_ + std::max(1u, (read_end_ - read_began_) / 2))) {
+    if (chunk + 1 == read_end_ || (ring_ > 0 && read_end_ < total &&
+                                   down_missing_ >= read_began_ + std::max(1u, (read_end_ - read_began_) / 2))) {
       read();
     }
   }
