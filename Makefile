@@ -6,7 +6,7 @@ SHELL := /bin/bash
 MAKEFLAGS += --no-print-directory
 
 BUILD := build
-export JOBS VERBOSE T SEED SEEDS SETUP STAGE CFG PLANE CELL
+export JOBS VERBOSE MINUTES T SEED SEEDS SETUP STAGE CFG PLANE CELL
 
 # Everything that `make config` passes on to scripts/make_config.cmake.
 CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
@@ -123,6 +123,11 @@ pnr: ## Maximum clock on ECP5-85 by nextpnr, three placements, units and engine 
 	@scripts/setup.sh build cost
 	@scripts/cost/pnr.py --units --config $(or $(CFG),tile) $(if $(SEEDS),--seeds $(SEEDS)) G_SPLIT=1
 
+.PHONY: pnr-update
+pnr-update: ## The table of docs/cost.md that make pnr is about: nine engines and units (an hour)
+	@scripts/setup.sh build cost
+	@scripts/cost/report.py --pnr
+
 .PHONY: ise
 ise: ## Vendor flow, Virtex-5QV and -6: ISE 14.7   BOARD=ml605 TOP=psweep CFG=tile GENERICS='G_X=n ..'
 	@scripts/ise/ise.py $(FLOW_OPTIONS)
@@ -154,6 +159,13 @@ config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=
 bench: setup ## Speed of the float reference, the bit-true model and the simulated RTL on this machine
 	@scripts/build.sh psweep psweep_bench one_tile
 	@scripts/bench.sh
+
+.PHONY: accuracy
+accuracy: setup ## Float and fixed against the truth, nine scenes, and every number format (half an hour)
+	@scripts/build.sh psweep_accuracy
+	@echo 'accuracy: scenes'; build/sw/eval/experiments/psweep_accuracy --seeds 1,2,3 cleanup fixed rules
+	@echo 'accuracy: unseen'; build/sw/eval/experiments/psweep_accuracy --seeds 11,12,13 cleanup fixed
+	@echo 'accuracy: formats'; build/sw/eval/experiments/psweep_accuracy --seeds 1 formats mncc
 
 .PHONY: waves
 waves: setup ## Waves of one cell, and its values at every stage   STAGE=similarity CFG=tiny PLANE=6 CELL=8,6
@@ -194,13 +206,28 @@ mac-opinion: ## The MAC against the MII models of cocotbext-eth in Icarus (fetch
 	@scripts/setup.sh build opinion
 	@scripts/mac_opinion.sh
 
+.PHONY: evidence
+evidence: ## Measures again what is stale of the pages' figures; goes on where it was   KIND='a b' FORCE=1 MINUTES=n
+	@scripts/setup.sh build evidence
+	@scripts/evidence.py run $(if $(FORCE),--force) $(KIND)
+
+.PHONY: evidence-status
+evidence-status: ## Which of it is stale, and since which change
+	@scripts/evidence.py status $(KIND)
+
 .PHONY: mutants
-mutants: setup ## Small faults in a copy of the RTL, one at a time: the tests find them   E=<entities> SEED=n COUNT=n
-	@scripts/mutants.sh $(if $(SEED),--seed $(SEED)) $(if $(COUNT),--count $(COUNT)) $(E)
+mutants: setup ## Small faults in a copy of the RTL: the tests find them   E=<entities> SEED=n COUNT=n MINUTES=n
+	@scripts/setup.sh evidence
+	@scripts/mutants.sh $(if $(SEED),--seed $(SEED)) $(if $(COUNT),--count $(COUNT)) \
+	  $(if $(MINUTES),--minutes $(MINUTES)) $(E)
 
 .PHONY: coverage
 coverage: setup ## Lines of VHDL (GHDL 4 or newer) and bits that the tests reach: build/coverage/
 	@scripts/coverage.sh
+
+.PHONY: coverage-lines coverage-toggles
+coverage-lines coverage-toggles: coverage-%: setup
+	@scripts/coverage.sh $*
 
 .PHONY: link-speed
 link-speed: setup ## Goodput, latency, busy share of the engine and time of a whole pair, on the simulated chip

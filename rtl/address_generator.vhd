@@ -11,6 +11,8 @@
 --   Rectified: G_RECTIFIED = 1: rows of both images fall on rows of samples. A sample between two rows counts as not
 --              loaded: not usable, and an error of the window if it is inside both images
 --   Table    : 8 words a plane, see docs/interfaces.md; written while no sample is in work
+--   Parity   : words of table and offsets have a parity bit (even), written with them; m_word_error tells a clock later
+--              that a word which a row has read, or its bit, is not what was written
 --   Rest     : m_row_* are 0 from the clock behind the last sample of a plane until the next row
 --   Reset    : clears the strobes on their way, m_row_* and usable_y; positions have no reset
 --   Golden   : sw/golden/address_generator.hpp
@@ -37,6 +39,7 @@ entity address_generator is
     offset_we   : in  std_logic;
     offset_addr : in  std_logic_vector(1 downto 0);
     cfg_data    : in  std_logic_vector(31 downto 0);
+    cfg_parity  : in  std_logic; -- '1' if cfg_data has an odd number of ones
 
     -- Static during a tile: last loaded column and row, bounds of the images in window coordinates.
     win_last_col : in  std_logic_vector(clog2(G_IMG_COLS) - 1 downto 0);
@@ -77,7 +80,8 @@ entity address_generator is
     m_row_odd_right  : out std_logic_vector(bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED) - 1 downto 0);
     m_usable_x       : out std_logic;
     m_usable_y       : out std_logic;
-    m_window_error   : out std_logic  -- inside both images, not loaded in at least one; only with m_valid
+    m_window_error   : out std_logic; -- inside both images, not loaded in at least one; only with m_valid
+    m_word_error     : out std_logic  -- a row has read a word with wrong parity; C_ROW_MIN clocks behind its strobe at most
   );
 end entity address_generator;
 
@@ -109,9 +113,13 @@ architecture rtl of address_generator is
   -- Clocks 0 - 7: table words and tile offsets.
   signal table_field  : std_logic_vector(2 downto 0);
   signal table_raddr  : std_logic_vector(clog2(G_PLANES) + 2 downto 0);
-  signal table_word   : std_logic_vector(31 downto 0);
+  signal write_word   : std_logic_vector(32 downto 0); -- parity bit on top, here and in the next two
+  signal table_word   : std_logic_vector(32 downto 0);
   signal offset_raddr : std_logic_vector(1 downto 0);
-  signal offset_word  : std_logic_vector(31 downto 0);
+  signal offset_word  : std_logic_vector(32 downto 0);
+  -- Clocks 3 - 8: both words of the clock before in parts of six bits, that is, a LUT each: the part has odd parity.
+  signal word_reading : std_logic;
+  signal part_odd     : std_logic_vector(10 downto 0);
 
   -- Clocks 2 - 5: the four start values of the row. (y_older, y_newer) rotate: left, right, left, right ..
   signal base          : unsigned(31 downto 0);
@@ -159,6 +167,10 @@ architecture rtl of address_generator is
   signal out_inside_x  : std_logic;
   signal out_loaded_x  : std_logic;
 
+  attribute use_dsp48 : string;
+
+  attribute use_dsp48 of product : signal is C_DSP;
+
   function floor_of (position : unsigned) return signed is
   begin
     return signed(position(31 downto C_POS_FRAC));
@@ -205,19 +217,39 @@ architecture rtl of address_generator is
 begin
 
   assert G_PLANES >= 1 and G_PLANES <= 1024
-    report "address_generator: G_PLANES=" & integer'image(G_PLANES) & " outside 1..1024"
+    report "address_generator: G_PLANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANES)
+           -- synthesis translate_on
+           & " outside 1..1024"
     severity failure;
   assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
-    report "address_generator: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    report "address_generator: G_IMG_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_COLS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
-    report "address_generator: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    report "address_generator: G_IMG_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_ROWS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
-    report "address_generator: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    report "address_generator: G_WEIGHT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WEIGHT_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_RECTIFIED = 0 or G_RECTIFIED = 1
-    report "address_generator: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    report "address_generator: G_RECTIFIED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_RECTIFIED)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
 
   row(0) <= s_row_first;
@@ -253,9 +285,11 @@ begin
   table_field(2) <= ((row(0) or row(1)) and not s_plane_first) or row(4) or row(5);
   table_raddr    <= s_plane & table_field;
 
+  write_word  <= cfg_parity & cfg_data;
+
   u_table : entity work.ram_sdp
     generic map (
-      G_DATA_W  => 32,
+      G_DATA_W  => 33,
       G_DEPTH   => C_TABLE,
       G_LATENCY => 2
     )
@@ -263,7 +297,7 @@ begin
       clk   => clk,
       we    => table_we,
       waddr => table_addr,
-      wdata => cfg_data,
+      wdata => write_word,
       raddr => table_raddr,
       rdata => table_word
     );
@@ -274,7 +308,7 @@ begin
 
   u_offsets : entity work.ram_sdp
     generic map (
-      G_DATA_W  => 32,
+      G_DATA_W  => 33,
       G_DEPTH   => 4,
       G_LATENCY => 1
     )
@@ -282,14 +316,48 @@ begin
       clk   => clk,
       we    => offset_we,
       waddr => offset_addr,
-      wdata => cfg_data,
+      wdata => write_word,
       raddr => offset_raddr,
       rdata => offset_word
     );
 
+  -- Parity -----------------------------------------------------------------------------------------------------------
+  -- Only words that a row in work has asked for: of the table, others may never have been written. (The words of the
+  -- offsets come a clock earlier in the row, and word 0 behind them.)
+  word_reading <= to_bit(row(7 downto 2) /= "000000");
+
+  p_parity : process (clk)
+    variable v_words : std_logic_vector(65 downto 0);
+    variable v_odd   : std_logic;
+  begin
+    if rising_edge(clk) then
+      v_words := offset_word & table_word;
+      for n in part_odd'range loop
+        v_odd := '0';
+        for k in 6 * n to 6 * n + 5 loop
+          v_odd := v_odd xor v_words(k);
+        end loop;
+        part_odd(n) <= v_odd;
+      end loop;
+      if word_reading = '0' then
+        part_odd <= (others => '0');
+      end if;
+    end if;
+  end process p_parity;
+
+  p_word_error : process (part_odd)
+    variable v_odd : std_logic;
+  begin
+    v_odd := '0';
+    for n in part_odd'range loop
+      v_odd := v_odd xor part_odd(n);
+    end loop;
+    m_word_error <= v_odd;
+  end process p_word_error;
+
   -- Start values -----------------------------------------------------------------------------------------------------
-  base        <= y_older when (row(2) = '1' or row(3) = '1') and s_plane_first = '0' else unsigned(offset_word);
-  start_value <= unsigned(table_word) + base;
+  base        <= y_older when (row(2) = '1' or row(3) = '1') and s_plane_first = '0' else unsigned(offset_word(31 downto 0));
+  start_value <= unsigned(table_word(31 downto 0)) + base;
 
   p_start : process (clk)
   begin

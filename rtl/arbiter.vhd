@@ -241,13 +241,25 @@ architecture rtl of arbiter is
 begin
 
   assert C_CHUNK_PAIRS >= 1 and C_CHUNK_CELLS >= 1
-    report "arbiter: G_CHUNK_BYTES=" & integer'image(G_CHUNK_BYTES) & " holds no pair or no cell"
+    report "arbiter: G_CHUNK_BYTES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_BYTES)
+           -- synthesis translate_on
+           & " holds no pair or no cell"
     severity failure;
   assert G_ROW_SLOTS >= 0 and G_ROW_SLOTS /= 1
-    report "arbiter: G_ROW_SLOTS=" & integer'image(G_ROW_SLOTS) & " is neither 0 nor from 2 on"
+    report "arbiter: G_ROW_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_ROW_SLOTS)
+           -- synthesis translate_on
+           & " is neither 0 nor from 2 on"
     severity failure;
   assert G_MAP_DEPTH >= 0
-    report "arbiter: G_MAP_DEPTH=" & integer'image(G_MAP_DEPTH) & " below 0"
+    report "arbiter: G_MAP_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAP_DEPTH)
+           -- synthesis translate_on
+           & " below 0"
     severity failure;
 
   -- Receive -----------------------------------------------------------------------------------------------------------

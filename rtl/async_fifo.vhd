@@ -106,10 +106,18 @@ architecture rtl of async_fifo is
 begin
 
   assert G_DATA_W >= 1
-    report "async_fifo: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    report "async_fifo: G_DATA_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DATA_W)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_DEPTH_LOG2 >= 2 and G_DEPTH_LOG2 <= 6
-    report "async_fifo: G_DEPTH_LOG2=" & integer'image(G_DEPTH_LOG2) & " outside 2..6"
+    report "async_fifo: G_DEPTH_LOG2"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH_LOG2)
+           -- synthesis translate_on
+           & " outside 2..6"
     severity failure;
 
   -- Crossings.

@@ -25,6 +25,10 @@ architecture rtl of cdc_sync is
   -- Oldest stage on the left.
   signal stages : std_logic_vector(G_STAGES * G_WIDTH - 1 downto 0);
 
+  attribute keep : string;
+
+  attribute keep of stages : signal is "TRUE";
+
   attribute async_reg     : string;
   attribute shreg_extract : string;
 
@@ -34,10 +38,18 @@ architecture rtl of cdc_sync is
 begin
 
   assert G_WIDTH >= 1
-    report "cdc_sync: G_WIDTH=" & integer'image(G_WIDTH) & " below 1"
+    report "cdc_sync: G_WIDTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WIDTH)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_STAGES >= 2 and G_STAGES <= 4
-    report "cdc_sync: G_STAGES=" & integer'image(G_STAGES) & " outside 2..4"
+    report "cdc_sync: G_STAGES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_STAGES)
+           -- synthesis translate_on
+           & " outside 2..4"
     severity failure;
 
   q <= stages(stages'high downto (G_STAGES - 1) * G_WIDTH);

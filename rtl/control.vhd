@@ -11,10 +11,11 @@
 --   Writes   : take effect two clocks after they are on s_cfg, those of table and offsets three
 --   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
 --              work the address of a write is not looked at. A last map beat beats an abort in the same clock
---   Upsets   : the state has a parity bit: no upset of one bit makes another state of it. A code without a name and a
---              map that ends before or after its last beat drop the tile (error bit 'upset'). Sets are
---              counted to 'not below', so that no upset makes a tile longer than the largest of the build
---   Counters : saturating; clear also resets the latch that counts window errors once a tile. tile_clocks is kept
+--   Upsets   : the state has a parity bit: no upset of one bit makes another state of it. A code without a name, a map
+--              that ends before or after its last beat, and a word of table or offsets that is not what was written
+--              drop the tile a clock later (error bit 'upset'). Sets are counted to 'not below', so that no upset makes
+--              a tile longer than the largest of the build
+--   Counters : saturating, tiles_dropped and error_count a clock behind their event; clear also resets the latch that counts window errors once a tile. tile_clocks is kept
 --   Reset    : idle, sizes missing, table empty, counters 0; bounds are not reset: write them before the first start
 --   Golden   : sw/golden/control.hpp
 library ieee;
@@ -48,6 +49,7 @@ entity control is
 
     -- Writes to address_generator's memories.
     cfg_data    : out std_logic_vector(31 downto 0);
+    cfg_parity  : out std_logic; -- '1' if cfg_data has an odd number of ones
     table_we    : out std_logic;
     table_addr  : out std_logic_vector(clog2(G_PLANES) + 2 downto 0);
     offset_we   : out std_logic;
@@ -90,6 +92,7 @@ entity control is
     map_last   : in  std_logic; -- the last map beat is being taken
 
     window_error : in  std_logic_vector(G_LANES - 1 downto 0); -- of address_generator, one a sample
+    word_error   : in  std_logic_vector(G_LANES - 1 downto 0); -- of address_generator: wrong parity
 
     state         : out std_logic_vector(2 downto 0);
     busy          : out std_logic;
@@ -155,8 +158,11 @@ architecture rtl of control is
   signal cfg_middle   : std_logic;             -- to 0x0020 .. 0x7FFF, where nothing is
   signal cfg_high     : std_logic;             -- to 0x8000 and up
   signal cfg_in_table : std_logic;             -- the low bits are an address of the table
-  signal cfg_fits     : std_logic;             -- the value has no more than 17 bits, of which
-  signal cfg_value    : unsigned(16 downto 0); -- a limit of 2 ** 16 needs the last one
+  signal cfg_fits     : std_logic;             -- the value has no more than 16 bits
+  signal cfg_some     : std_logic;             -- .. of which one is '1'
+  signal cfg_value    : unsigned(15 downto 0);
+  signal cfg_limit    : unsigned(15 downto 0); -- largest value of the register
+  signal cfg_in_range : std_logic;             -- size or threshold
   signal cfg_less_1   : unsigned(11 downto 0); -- of the low 12 bits
   signal cfg_register : std_logic;             -- any write to 0x0001 .. 0x001F, while idle
   signal cfg_index    : unsigned(4 downto 0);
@@ -194,6 +200,8 @@ architecture rtl of control is
   signal at_set_end   : std_logic; -- in the last set
   signal at_set_end_q : std_logic;
   signal lanes        : std_logic_vector(G_LANES - 1 downto 0); -- m_lanes, a clock ahead
+  signal next_last_col   : unsigned(C_COL_W - 1 downto 0); -- of load (in idle), then of the sweep
+  signal next_last_row   : unsigned(C_ROW_W - 1 downto 0);
   signal last_col_less_1 : unsigned(C_COL_W - 1 downto 0); -- of load or sweep
   signal last_row_less_1 : unsigned(C_ROW_W - 1 downto 0);
   signal one_col     : std_logic; -- rows of one pixel
@@ -219,6 +227,9 @@ architecture rtl of control is
   signal start_ok    : std_logic;
   signal tile_done   : std_logic;
   signal tile_drop   : std_logic;
+  signal drop_q      : std_logic;
+  signal halt        : std_logic; -- idle comes next, whatever the state
+  signal move        : std_logic; -- the state is over
   signal config_bad  : std_logic;
   signal table_bad   : std_logic;
   signal window_seen : std_logic; -- in this tile
@@ -231,12 +242,12 @@ architecture rtl of control is
   signal event_short   : std_logic;
   signal event_long    : std_logic;
   signal event_window  : std_logic;
-  signal event_upset   : std_logic;
+  signal upset_now     : std_logic;
+  signal event_upset   : std_logic; -- a clock later
   signal cfg_event     : std_logic;
   signal tile_event    : std_logic;
   signal new_events    : unsigned(1 downto 0);
-  signal window_lost   : std_logic_vector(G_LANES - 1 downto 0);
-  signal samples_lost  : unsigned(2 downto 0); -- over all lanes
+  signal samples_lost  : unsigned(2 downto 0); -- not loaded, over all lanes
   signal sample_lost   : std_logic;
 
   signal error_bits          : std_logic_vector(7 downto 0);
@@ -247,6 +258,10 @@ architecture rtl of control is
   signal window_errors_q     : unsigned(15 downto 0);
   signal window_errors_next  : unsigned(16 downto 0);
   signal tile_clocks_q       : unsigned(31 downto 0);
+
+  attribute fsm_extract : string;
+
+  attribute fsm_extract of state_q : signal is C_FSM_KEPT;
 
   -- value + 1, all ones stay.
   function plus_1_saturated (value : unsigned(15 downto 0)) return unsigned is
@@ -260,31 +275,67 @@ architecture rtl of control is
 begin
 
   assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
-    report "control: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    report "control: G_IMG_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_COLS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
-    report "control: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    report "control: G_IMG_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_ROWS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_PLANE_COLS >= 1 and G_PLANE_COLS <= 4096
-    report "control: G_PLANE_COLS=" & integer'image(G_PLANE_COLS) & " outside 1..4096"
+    report "control: G_PLANE_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANE_COLS)
+           -- synthesis translate_on
+           & " outside 1..4096"
     severity failure;
   assert G_PLANE_ROWS >= 1 and G_PLANE_ROWS <= 4096
-    report "control: G_PLANE_ROWS=" & integer'image(G_PLANE_ROWS) & " outside 1..4096"
+    report "control: G_PLANE_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANE_ROWS)
+           -- synthesis translate_on
+           & " outside 1..4096"
     severity failure;
   assert G_PLANES >= 1 and G_PLANES <= 1024
-    report "control: G_PLANES=" & integer'image(G_PLANES) & " outside 1..1024"
+    report "control: G_PLANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANES)
+           -- synthesis translate_on
+           & " outside 1..1024"
     severity failure;
   assert G_WINDOW >= 3 and G_WINDOW <= 21 and G_WINDOW mod 2 = 1
-    report "control: G_WINDOW=" & integer'image(G_WINDOW) & " outside 3..21 or even"
+    report "control: G_WINDOW"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WINDOW)
+           -- synthesis translate_on
+           & " outside 3..21 or even"
     severity failure;
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
-    report "control: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    report "control: G_MNCC_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MNCC_W)
+           -- synthesis translate_on
+           & " outside 4..16"
     severity failure;
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "control: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "control: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
   assert G_LATENCY >= 1 and G_LATENCY <= 125
-    report "control: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..125"
+    report "control: G_LATENCY"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LATENCY)
+           -- synthesis translate_on
+           & " outside 1..125"
     severity failure;
 
   is_idle   <= to_bit(state_q = C_IDLE);
@@ -311,7 +362,8 @@ begin
       cfg_middle   <= s_cfg_tvalid and not s_cfg_tdata(47) and to_bit(unsigned(s_cfg_tdata(46 downto 37)) /= 0);
       cfg_high     <= s_cfg_tvalid and s_cfg_tdata(47);
       cfg_in_table <= to_bit(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS);
-      cfg_fits     <= to_bit(unsigned(s_cfg_tdata(31 downto 17)) = 0);
+      cfg_fits     <= to_bit(unsigned(s_cfg_tdata(31 downto 16)) = 0);
+      cfg_some     <= to_bit(unsigned(s_cfg_tdata(15 downto 0)) /= 0);
       if rst = '1' then
         cfg_command <= '0';
         cfg_low     <= '0';
@@ -321,11 +373,20 @@ begin
     end if;
   end process p_cfg;
 
-  cfg_value     <= unsigned(cfg_word(16 downto 0));
+  cfg_value     <= unsigned(cfg_word(15 downto 0));
   cfg_less_1    <= unsigned(cfg_word(11 downto 0)) - 1;
   cfg_index     <= unsigned(cfg_word(36 downto 32));
   cfg_register  <= cfg_low and is_idle;
   cfg_table     <= cfg_high and is_idle;
+  -- One comparison for all of them; of index 6, the threshold, 0 is in range, too.
+  cfg_limit     <= to_unsigned(G_PLANE_COLS, 16) when cfg_index(2 downto 0) = C_TILE_COLS
+                   else to_unsigned(G_PLANE_ROWS, 16) when cfg_index(2 downto 0) = C_TILE_ROWS
+                   else to_unsigned(G_IMG_COLS, 16) when cfg_index(2 downto 0) = C_WIN_COLS
+                   else to_unsigned(G_IMG_ROWS, 16) when cfg_index(2 downto 0) = C_WIN_ROWS
+                   else to_unsigned(G_PLANES, 16) when cfg_index(2 downto 0) = C_PLANES
+                   else to_unsigned(2 ** G_MNCC_W - 1, 16);
+  cfg_in_range  <= cfg_fits and (cfg_some or to_bit(cfg_index(2 downto 0) = C_THRESHOLD))
+                   and to_bit(cfg_value <= cfg_limit);
   command_clear <= cfg_command and cfg_word(2);
   command_abort <= cfg_command and cfg_word(1);
   command_start <= cfg_command and cfg_word(0) and not cfg_word(1);
@@ -336,9 +397,15 @@ begin
 
   -- A register more, as the table's blocks lie far apart. The first row is read long after the last write.
   p_table : process (clk)
+    variable v_odd : std_logic;
   begin
     if rising_edge(clk) then
+      v_odd := '0';
+      for k in 0 to 31 loop
+        v_odd := v_odd xor cfg_word(k);
+      end loop;
       cfg_data    <= cfg_word(31 downto 0);
+      cfg_parity  <= v_odd;
       table_we    <= cfg_table and table_ok;
       table_addr  <= cfg_word(C_TABLE_W + 31 downto 32);
       offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
@@ -364,42 +431,36 @@ begin
   start_ok     <= command_start and is_idle and not config_bad and not table_bad;
 
   p_registers : process (clk)
-    variable v_ok : std_logic;
   begin
     if rising_edge(clk) then
       if cfg_register = '1' then
         if cfg_index = C_TILE_COLS then
-          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_COLS);
-          tile_cols_ok <= v_ok;
-          if v_ok = '1' then
+          tile_cols_ok <= cfg_in_range;
+          if cfg_in_range = '1' then
             tile_last_col <= cfg_less_1(tile_last_col'range);
           end if;
         elsif cfg_index = C_TILE_ROWS then
-          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_PLANE_ROWS);
-          tile_rows_ok <= v_ok;
-          if v_ok = '1' then
+          tile_rows_ok <= cfg_in_range;
+          if cfg_in_range = '1' then
             tile_last_row <= cfg_less_1(tile_last_row'range);
           end if;
         elsif cfg_index = C_WIN_COLS then
-          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_IMG_COLS);
-          win_cols_ok <= v_ok;
-          if v_ok = '1' then
+          win_cols_ok <= cfg_in_range;
+          if cfg_in_range = '1' then
             win_last_col_q <= cfg_less_1(win_last_col_q'range);
           end if;
         elsif cfg_index = C_WIN_ROWS then
-          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_IMG_ROWS);
-          win_rows_ok <= v_ok;
-          if v_ok = '1' then
+          win_rows_ok <= cfg_in_range;
+          if cfg_in_range = '1' then
             win_last_row_q <= cfg_less_1(win_last_row_q'range);
           end if;
         elsif cfg_index = C_PLANES then
-          v_ok := cfg_fits and to_bit(cfg_value >= 1 and cfg_value <= G_PLANES);
-          planes_ok <= v_ok;
-          if v_ok = '1' then
+          planes_ok <= cfg_in_range;
+          if cfg_in_range = '1' then
             last_plane <= cfg_less_1(last_plane'range);
           end if;
         elsif cfg_index = C_THRESHOLD then
-          threshold_ok <= cfg_fits and to_bit(cfg_value < 2 ** G_MNCC_W);
+          threshold_ok <= cfg_in_range;
           threshold    <= cfg_word(G_MNCC_W - 1 downto 0);
         elsif cfg_index = C_LEFT then
           left_x_lo <= cfg_word(C_INT_W - 1 downto 0);
@@ -459,6 +520,9 @@ begin
   pix_ready <= is_load or is_drain;
   pix_fire  <= s_pix_tvalid and is_load;
 
+  next_last_col <= resize(win_last_col_q, C_COL_W) when is_idle = '1' else row_last_col;
+  next_last_row <= resize(win_last_row_q, C_ROW_W) when is_idle = '1' else sweep_last_row;
+
   at_last     <= at_col_end and at_row_end;
   last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
   last_set    <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
@@ -472,10 +536,18 @@ begin
   sample_last <= active and at_row_end and to_bit(col = sweep_last_col);
   flushed     <= is_flush and to_bit(since_last = C_FLUSH);
   tile_done   <= is_unload and map_last and not map_more;
-  -- What cannot be unless a bit was upset: a state without a name, or a map that ends before or after its last beat.
-  event_upset <= not (is_idle or is_load or is_sweep or is_flush or is_unload or is_drain)
+  -- What cannot be unless a bit was upset: a state without a name, a map that ends before or after its last beat, or a
+  -- word of table or offsets with wrong parity (beside a sweep, one of a tile that was dropped).
+  upset_now   <= not (is_idle or is_load or is_sweep or is_flush or is_unload or is_drain)
                  or (is_unload and not map_more and not map_valid)
-                 or (map_last and map_more and not abort_q); -- (a beat that an abort takes away is none)
+                 or (map_last and map_more and not abort_q) -- (a beat that an abort takes away is none)
+                 or ((is_sweep or is_flush) and to_bit(unsigned(word_error) /= 0));
+  halt        <= command_abort or event_upset;
+  -- Apart from where to, so that no chain of states lies before the register's enable.
+  move        <= (is_idle and command_start)
+                 or (is_load and s_pix_tvalid and (at_last or s_pix_tlast))
+                 or at_tile_end or flushed or tile_done
+                 or (is_drain and s_pix_tvalid and s_pix_tlast);
   -- A drained tile was counted when it was refused.
   tile_drop   <= event_config or event_table or event_short or event_long or event_upset
                  or (command_abort and not is_idle and not is_drain and not tile_done and not event_short
@@ -485,41 +557,35 @@ begin
   begin
     if rising_edge(clk) then
       start_q <= load_done and not command_abort;
-      abort_q <= command_abort or event_upset;
+      abort_q <= halt;
 
-      if is_idle = '1' then
-        if start_ok = '1' then
-          state_q <= C_LOAD;
-        elsif event_config = '1' or event_table = '1' then
-          state_q <= C_DRAIN;
-        end if;
-      elsif is_load = '1' then
-        if load_done = '1' then
-          state_q <= C_SWEEP;
-        elsif event_short = '1' then
-          state_q <= C_IDLE;
-        elsif event_long = '1' then
-          state_q <= C_DRAIN;
-        end if;
-      elsif is_sweep = '1' then
-        if at_tile_end = '1' then
+      if move = '1' then
+        if is_idle = '1' then
+          if config_bad = '1' or table_bad = '1' then
+            state_q <= C_DRAIN;
+          else
+            state_q <= C_LOAD;
+          end if;
+        elsif is_load = '1' then
+          if at_last = '0' then
+            state_q <= C_IDLE;
+          elsif s_pix_tlast = '1' then
+            state_q <= C_SWEEP;
+          else
+            state_q <= C_DRAIN;
+          end if;
+        elsif is_sweep = '1' then
           state_q <= C_FLUSHING;
-        end if;
-      elsif is_flush = '1' then
-        if flushed = '1' then
+        elsif is_flush = '1' then
           state_q <= C_UNLOAD;
-        end if;
-      elsif is_unload = '1' then
-        if tile_done = '1' then
-          state_q <= C_IDLE;
-        end if;
-      elsif is_drain = '1' then
-        if s_pix_tvalid = '1' and s_pix_tlast = '1' then
+        else
           state_q <= C_IDLE;
         end if;
       end if;
-      if rst = '1' or command_abort = '1' or event_upset = '1' then
-        state_q <= C_IDLE;
+      event_upset <= upset_now;
+      if rst = '1' or halt = '1' then
+        event_upset <= '0';
+        state_q     <= C_IDLE;
       end if;
 
       -- Counters come back to 0 by themselves at the end of load and of every plane. Whether they are at their ends is
@@ -541,16 +607,16 @@ begin
         end if;
       end if;
       -- Limits of load are set up in idle, those of the sweep, which has at least three rows, when load is over.
+      if is_idle = '1' or load_done = '1' then
+        last_col_less_1 <= next_last_col - 1;
+        last_row_less_1 <= next_last_row - 1;
+      end if;
       if is_idle = '1' then
-        last_col_less_1 <= resize(win_last_col_q, C_COL_W) - 1;
-        last_row_less_1 <= resize(win_last_row_q, C_ROW_W) - 1;
         one_col    <= to_bit(win_last_col_q = 0);
         one_row    <= to_bit(win_last_row_q = 0);
         at_col_end <= to_bit(win_last_col_q = 0);
         at_row_end <= to_bit(win_last_row_q = 0);
       elsif load_done = '1' then
-        last_col_less_1 <= row_last_col - 1;
-        last_row_less_1 <= sweep_last_row - 1;
         one_col    <= '0';
         one_row    <= '0';
         at_col_end <= '0';
@@ -589,7 +655,7 @@ begin
         since_last <= since_last + 1;
       end if;
 
-      if rst = '1' or command_abort = '1' or event_upset = '1' then
+      if rst = '1' or halt = '1' then
         row_first <= '0';
         active    <= '0';
         start_q   <= '0';
@@ -623,7 +689,7 @@ begin
       m_plane_last  <= sample_last;
       m_plane       <= std_logic_vector(plane_set);
       m_lanes       <= lanes;
-      if rst = '1' or command_abort = '1' or event_upset = '1' then
+      if rst = '1' or halt = '1' then
         m_valid     <= '0';
         m_row_first <= '0';
       end if;
@@ -634,28 +700,21 @@ begin
   -- Counted a clock later: the address generator's tests lie before them. In the clock after an abort it still shows a
   -- sample of the tile.
   p_window : process (clk)
+    variable v_count : unsigned(2 downto 0);
   begin
     if rising_edge(clk) then
+      v_count := (others => '0');
       for n in 0 to G_LANES - 1 loop
-        window_lost(n) <= window_error(n) and not abort_q;
+        if window_error(n) = '1' then
+          v_count := v_count + 1;
+        end if;
       end loop;
-      if rst = '1' then
-        window_lost <= (others => '0');
+      samples_lost <= v_count;
+      if rst = '1' or abort_q = '1' then
+        samples_lost <= (others => '0');
       end if;
     end if;
   end process p_window;
-
-  p_lost : process (window_lost)
-    variable v_count : unsigned(2 downto 0);
-  begin
-    v_count := (others => '0');
-    for n in 0 to G_LANES - 1 loop
-      if window_lost(n) = '1' then
-        v_count := v_count + 1;
-      end if;
-    end loop;
-    samples_lost <= v_count;
-  end process p_lost;
 
   sample_lost        <= to_bit(samples_lost /= 0);
   window_errors_next <= ('0' & window_errors_q) + samples_lost;
@@ -685,7 +744,8 @@ begin
       if tile_done = '1' then
         tiles_done_q <= plus_1_saturated(tiles_done_q);
       end if;
-      if tile_drop = '1' then
+      drop_q <= tile_drop; -- counted a clock later, as many events lead to it
+      if drop_q = '1' then
         tiles_dropped_q <= plus_1_saturated(tiles_dropped_q);
       end if;
       if G_LANES = 1 then -- the smaller circuit
@@ -716,8 +776,7 @@ begin
         error_count_q                <= (others => '0');
         tiles_done_q(15 downto 1)    <= (others => '0');
         tiles_done_q(0)              <= tile_done;
-        tiles_dropped_q(15 downto 1) <= (others => '0');
-        tiles_dropped_q(0)           <= tile_drop;
+        tiles_dropped_q              <= (others => '0');
         window_errors_q              <= resize(samples_lost, 16);
         window_seen                  <= event_window;
       end if;
@@ -729,6 +788,7 @@ begin
       if rst = '1' then
         error_bits      <= (others => '0');
         new_events      <= (others => '0');
+        drop_q          <= '0';
         error_count_q   <= (others => '0');
         tiles_done_q    <= (others => '0');
         tiles_dropped_q <= (others => '0');
@@ -758,7 +818,7 @@ begin
     if rising_edge(clk) then
       if rst = '0' then
         assert event_upset = '0'
-          report "control: a state that cannot be"
+          report "control: a state that cannot be, an end of the map that cannot be, or a word with wrong parity"
           severity failure;
         assert not is_x(error_bits) and not is_x(std_logic_vector(error_count_q)) and not is_x(state_q)
           report "control: an unknown state, error bit or counter"

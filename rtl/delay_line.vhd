@@ -28,10 +28,18 @@ architecture rtl of delay_line is
 begin
 
   assert G_DATA_W >= 1
-    report "delay_line: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    report "delay_line: G_DATA_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DATA_W)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_DELAY >= 1 and G_DELAY <= 64
-    report "delay_line: G_DELAY=" & integer'image(G_DELAY) & " outside 1..64"
+    report "delay_line: G_DELAY"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DELAY)
+           -- synthesis translate_on
+           & " outside 1..64"
     severity failure;
 
   g_one : if G_DELAY = 1 generate

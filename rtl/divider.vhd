@@ -7,8 +7,8 @@
 --   Method  : non-restoring, one quotient bit a stage: remainder' = 2 remainder -/+ den, subtracting after a remainder
 --             >= 0. The signs are those of restoring division, without its multiplexer: one adder a stage.
 --   Reset   : none; validity travels outside
---   Why so  : the first stage and, behind it, a divider of one bit less. Recursion gives every stage its own signals,
---             where an array of remainders would become one wide word in the converted netlist.
+--   Stages  : s_num and s_den are what stage 0 gets; each gets the remainder and den of the one before, from words that
+--             hold those of all stages, its own in the bits from its number times their width on
 --   Golden  : divide_fraction() in sw/golden/similarity.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -30,66 +30,83 @@ end entity divider;
 
 architecture rtl of divider is
 
-  signal addend    : unsigned(G_NUM_W downto 0); -- +den or -den-1, the missing 1 enters as carry
-  signal sum       : unsigned(G_NUM_W + 1 downto 0);
-  signal remainder : std_logic_vector(G_NUM_W downto 0);
-  signal den       : std_logic_vector(G_NUM_W - 1 downto 0);
-  signal quot_bit  : std_logic_vector(0 downto 0);
+  constant C_REM_W : integer := G_NUM_W + 1;
+
+  -- What stage i gets, from bit i * width on. The last ones come out of the last stage.
+  signal remainders : std_logic_vector((G_QUOT_W + 1) * C_REM_W - 1 downto 0);
+  signal dens       : std_logic_vector((G_QUOT_W + 1) * G_NUM_W - 1 downto 0);
 
 begin
 
   assert G_NUM_W >= 2 and G_NUM_W <= 32
-    report "divider: G_NUM_W=" & integer'image(G_NUM_W) & " outside 2..32"
+    report "divider: G_NUM_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_NUM_W)
+           -- synthesis translate_on
+           & " outside 2..32"
     severity failure;
   assert G_QUOT_W >= 1 and G_QUOT_W <= 24
-    report "divider: G_QUOT_W=" & integer'image(G_QUOT_W) & " outside 1..24"
+    report "divider: G_QUOT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_QUOT_W)
+           -- synthesis translate_on
+           & " outside 1..24"
     severity failure;
 
-  addend <= unsigned('0' & s_den) when s_num(G_NUM_W) = '1' else unsigned('1' & not s_den);
-  -- The carry is made by a bit below the operands, so that this is one adder; its own bit is cut off.
-  sum    <= unsigned(s_num(G_NUM_W - 1 downto 0) & '0' & not s_num(G_NUM_W))
-            + (addend & not s_num(G_NUM_W));
+  remainders(C_REM_W - 1 downto 0) <= s_num;
+  dens(G_NUM_W - 1 downto 0)       <= s_den;
 
-  p_step : process (clk)
+  g_stages : for i in 0 to G_QUOT_W - 1 generate
+    signal num       : std_logic_vector(C_REM_W - 1 downto 0);
+    signal den       : std_logic_vector(G_NUM_W - 1 downto 0);
+    signal addend    : unsigned(G_NUM_W downto 0); -- +den or -den-1, the missing 1 enters as carry
+    signal sum       : unsigned(G_NUM_W + 1 downto 0);
+    signal remainder : std_logic_vector(C_REM_W - 1 downto 0);
+    signal den_kept  : std_logic_vector(G_NUM_W - 1 downto 0);
+    signal quot_bit  : std_logic_vector(0 downto 0);
   begin
-    if rising_edge(clk) then
-      remainder <= std_logic_vector(sum(G_NUM_W + 1 downto 1));
-      den       <= s_den;
-    end if;
-  end process p_step;
 
-  quot_bit(0) <= not remainder(G_NUM_W);
+    num <= remainders((i + 1) * C_REM_W - 1 downto i * C_REM_W);
+    den <= dens((i + 1) * G_NUM_W - 1 downto i * G_NUM_W);
 
-  g_last : if G_QUOT_W = 1 generate
-    m_quot <= quot_bit;
-  end generate g_last;
+    addend <= unsigned('0' & den) when num(G_NUM_W) = '1' else unsigned('1' & not den);
+    -- The carry is made by a bit below the operands, so that this is one adder; its own bit is cut off.
+    sum    <= unsigned(num(G_NUM_W - 1 downto 0) & '0' & not num(G_NUM_W)) + (addend & not num(G_NUM_W));
 
-  g_more : if G_QUOT_W > 1 generate
+    p_step : process (clk)
+    begin
+      if rising_edge(clk) then
+        remainder <= std_logic_vector(sum(G_NUM_W + 1 downto 1));
+        den_kept  <= den;
+      end if;
+    end process p_step;
 
-    u_rest : entity work.divider
-      generic map (
-        G_NUM_W  => G_NUM_W,
-        G_QUOT_W => G_QUOT_W - 1
-      )
-      port map (
-        clk    => clk,
-        s_num  => remainder,
-        s_den  => den,
-        m_quot => m_quot(G_QUOT_W - 2 downto 0)
-      );
+    remainders((i + 2) * C_REM_W - 1 downto (i + 1) * C_REM_W) <= remainder;
+    dens((i + 2) * G_NUM_W - 1 downto (i + 1) * G_NUM_W)       <= den_kept;
 
-    u_wait : entity work.delay_line
-      generic map (
-        G_DATA_W => 1,
-        G_DELAY  => G_QUOT_W - 1
-      )
-      port map (
-        clk    => clk,
-        ce     => '1',
-        s_data => quot_bit,
-        m_data => m_quot(G_QUOT_W - 1 downto G_QUOT_W - 1)
-      );
+    quot_bit(0) <= not remainder(G_NUM_W);
 
-  end generate g_more;
+    -- The first bit waits for all others, the last one for none.
+    g_last : if i = G_QUOT_W - 1 generate
+      m_quot(0) <= quot_bit(0);
+    end generate g_last;
+
+    g_wait : if i < G_QUOT_W - 1 generate
+
+      u_wait : entity work.delay_line
+        generic map (
+          G_DATA_W => 1,
+          G_DELAY  => G_QUOT_W - 1 - i
+        )
+        port map (
+          clk    => clk,
+          ce     => '1',
+          s_data => quot_bit,
+          m_data => m_quot(G_QUOT_W - 1 - i downto G_QUOT_W - 1 - i)
+        );
+
+    end generate g_wait;
+
+  end generate g_stages;
 
 end architecture rtl;

@@ -16,6 +16,7 @@
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
+  use work.psweep_pkg.all;
 
 entity divider_mul is
   generic (
@@ -34,6 +35,7 @@ architecture rtl of divider_mul is
   constant C_NUM_W   : integer := G_QUOT_W + 3;
   constant C_REC_W   : integer := G_QUOT_W + 3;                 -- fraction bits of the reciprocal of 1.0 .. 2.0
   constant C_INDEX_W : integer := G_QUOT_W / 2;
+  constant C_LINES   : integer := 2 ** C_INDEX_W;
   constant C_LOW_W   : integer := C_NUM_W - 1 - C_INDEX_W;
   constant C_SLOPE_W : integer := C_REC_W - C_INDEX_W;
 
@@ -73,9 +75,9 @@ architecture rtl of divider_mul is
     return ((at_low(line) - at_high(line)) * 2 ** C_LOW_W + 2 ** C_LOW_W - 2) / (2 ** C_LOW_W - 1);
   end function slope_at;
 
-  type t_bases is array (0 to 2 ** C_INDEX_W - 1) of unsigned(C_REC_W - 1 downto 0);
+  type t_bases is array (0 to C_LINES - 1) of unsigned(C_REC_W - 1 downto 0);
 
-  type t_slopes is array (0 to 2 ** C_INDEX_W - 1) of unsigned(C_SLOPE_W - 1 downto 0);
+  type t_slopes is array (0 to C_LINES - 1) of unsigned(C_SLOPE_W - 1 downto 0);
 
   function bases return t_bases is
     variable v_table : t_bases;
@@ -101,7 +103,11 @@ architecture rtl of divider_mul is
 begin
 
   assert G_QUOT_W >= 1 and G_QUOT_W <= 16
-    report "divider_mul: G_QUOT_W=" & integer'image(G_QUOT_W) & " outside 1..16"
+    report "divider_mul: G_QUOT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_QUOT_W)
+           -- synthesis translate_on
+           & " outside 1..16"
     severity failure;
 
   g_steps : if G_QUOT_W < 8 generate
@@ -147,6 +153,10 @@ begin
     signal s6_product : unsigned(C_NUM_W + G_QUOT_W downto 0);
     signal s7_sum     : unsigned(C_NUM_W + G_QUOT_W downto 0);
     signal s7_quot    : std_logic_vector(G_QUOT_W - 1 downto 0);
+
+    attribute use_dsp48 : string;
+
+    attribute use_dsp48 of s2_growth, s4_product, s6_product : signal is C_DSP;
   begin
 
     p_pipe : process (clk)

@@ -132,16 +132,32 @@ architecture rtl of interpolation is
 begin
 
   assert G_PIX_W >= 1 and G_PIX_W <= 12
-    report "interpolation: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    report "interpolation: G_PIX_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PIX_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
-    report "interpolation: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    report "interpolation: G_WEIGHT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WEIGHT_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_INTERP_F >= 0 and G_INTERP_F <= 8
-    report "interpolation: G_INTERP_F=" & integer'image(G_INTERP_F) & " outside 0..8"
+    report "interpolation: G_INTERP_F"
+           -- synthesis translate_off
+           & "=" & integer'image(G_INTERP_F)
+           -- synthesis translate_on
+           & " outside 0..8"
     severity failure;
   assert G_RECTIFIED = 0 or G_RECTIFIED = 1
-    report "interpolation: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    report "interpolation: G_RECTIFIED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_RECTIFIED)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
 
   s0_fx  <= s_fx_right & s_fx_left;
@@ -165,6 +181,10 @@ begin
     signal s2_upper         : signed(C_ROW_W downto 0);
     -- s6 (s3 with G_RECTIFIED): result, ufix(G_PIX_W,G_INTERP_F)
     signal s6_sample : std_logic_vector(C_OUT_W - 1 downto 0);
+
+    attribute use_dsp48 : string;
+
+    attribute use_dsp48 of s2_upper_product : signal is C_DSP;
   begin
 
     fx  <= s0_fx((n + 1) * G_WEIGHT_W - 1 downto n * G_WEIGHT_W);
@@ -215,6 +235,8 @@ begin
       -- s5: times fy
       signal s5_product : signed(C_EXACT_W downto 0);
       signal s5_start   : signed(C_EXACT_W downto 0);
+
+      attribute use_dsp48 of s2_lower_product, s5_product : signal is C_DSP;
     begin
 
       fy  <= s0_fy((n + 1) * G_WEIGHT_W - 1 downto n * G_WEIGHT_W);

@@ -79,6 +79,10 @@ architecture rtl of mac_rx is
   signal room     : std_logic;
   signal valid    : std_logic;
 
+  attribute iob : string;
+
+  attribute iob of nibble, dv, er : signal is C_PAD;
+
 begin
 
   levels <= full_duplex & sending;

@@ -138,10 +138,18 @@ architecture rtl of mac_tx is
   signal crc     : std_logic_vector(31 downto 0);
   signal txd     : std_logic_vector(3 downto 0);
 
+  attribute iob : string;
+
+  attribute iob of txd : signal is C_PAD;
+
 begin
 
   assert G_SEED >= 1 and G_SEED <= 131071
-    report "mac_tx: G_SEED=" & integer'image(G_SEED) & " outside 1..131071"
+    report "mac_tx: G_SEED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SEED)
+           -- synthesis translate_on
+           & " outside 1..131071"
     severity failure;
 
   pins <= f_request & full_duplex & mii_crs & mii_col;

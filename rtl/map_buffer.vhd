@@ -124,17 +124,33 @@ architecture rtl of map_buffer is
 begin
 
   assert G_CELL_W >= 9 and G_CELL_W <= 48
-    report "map_buffer: G_CELL_W=" & integer'image(G_CELL_W) & " outside 9..48"
+    report "map_buffer: G_CELL_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CELL_W)
+           -- synthesis translate_on
+           & " outside 9..48"
     severity failure;
   assert G_CHUNK_CELLS >= 2 and G_CHUNK_CELLS <= 2048
-    report "map_buffer: G_CHUNK_CELLS=" & integer'image(G_CHUNK_CELLS) & " outside 2..2048"
+    report "map_buffer: G_CHUNK_CELLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_CELLS)
+           -- synthesis translate_on
+           & " outside 2..2048"
     severity failure;
   -- Numbers of chunks have 16 bits.
   assert G_CELLS >= 1 and G_CELLS < 2 ** 24 and G_CELLS / C_CHUNK < 65535
-    report "map_buffer: G_CELLS=" & integer'image(G_CELLS) & " outside 1..16777215 or over 65535 chunks"
+    report "map_buffer: G_CELLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CELLS)
+           -- synthesis translate_on
+           & " outside 1..16777215 or over 65535 chunks"
     severity failure;
   assert G_DEPTH >= G_CELLS or (G_DEPTH >= G_CHUNK_CELLS and G_DEPTH mod C_CHUNK = 0)
-    report "map_buffer: G_DEPTH=" & integer'image(G_DEPTH) & " is neither G_CELLS nor one or more chunks"
+    report "map_buffer: G_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH)
+           -- synthesis translate_on
+           & " is neither G_CELLS nor one or more chunks"
     severity failure;
 
   -- Write ------------------------------------------------------------------------------------------------------------

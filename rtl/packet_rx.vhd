@@ -210,10 +210,18 @@ architecture rtl of packet_rx is
 begin
 
   assert G_SLOTS = 2 or G_SLOTS = 4
-    report "packet_rx: G_SLOTS=" & integer'image(G_SLOTS) & " is neither 2 nor 4"
+    report "packet_rx: G_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SLOTS)
+           -- synthesis translate_on
+           & " is neither 2 nor 4"
     severity failure;
   assert G_UDP_PORT >= 1 and G_UDP_PORT <= 65535
-    report "packet_rx: G_UDP_PORT=" & integer'image(G_UDP_PORT) & " outside 1..65535"
+    report "packet_rx: G_UDP_PORT"
+           -- synthesis translate_off
+           & "=" & integer'image(G_UDP_PORT)
+           -- synthesis translate_on
+           & " outside 1..65535"
     severity failure;
 
   -- Position ----------------------------------------------------------------------------------------------------------

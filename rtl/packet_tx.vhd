@@ -150,7 +150,11 @@ architecture rtl of packet_tx is
 begin
 
   assert G_UDP_PORT >= 1 and G_UDP_PORT <= 65535
-    report "packet_tx: G_UDP_PORT=" & integer'image(G_UDP_PORT) & " outside 1..65535"
+    report "packet_tx: G_UDP_PORT"
+           -- synthesis translate_off
+           & "=" & integer'image(G_UDP_PORT)
+           -- synthesis translate_on
+           & " outside 1..65535"
     severity failure;
 
   -- Control -----------------------------------------------------------------------------------------------------------

@@ -127,6 +127,7 @@ architecture rtl of psweep is
 
   -- Registers and table writes.
   signal cfg_data     : std_logic_vector(31 downto 0);
+  signal cfg_parity   : std_logic;
   signal table_we     : std_logic;
   signal table_addr   : std_logic_vector(clog2(G_PLANES) + 2 downto 0);
   -- Lane and word of a table write: plane n * G_LANES + lane is entry n of the lane.
@@ -184,6 +185,7 @@ architecture rtl of psweep is
   signal address_usable_x       : std_logic_vector(G_LANES - 1 downto 0);
   signal address_usable_y       : std_logic_vector(G_LANES - 1 downto 0);
   signal address_window_error   : std_logic_vector(G_LANES - 1 downto 0);
+  signal address_word_error     : std_logic_vector(G_LANES - 1 downto 0);
 
   -- storage to interpolation.
   signal quad_valid       : std_logic_vector(G_LANES - 1 downto 0);
@@ -221,11 +223,19 @@ architecture rtl of psweep is
   signal cell_inside   : std_logic_vector(G_LANES - 1 downto 0);
   signal cell_textured : std_logic_vector(G_LANES - 1 downto 0);
   signal cell_v        : std_logic_vector(G_LANES * G_MNCC_W - 1 downto 0);
+
+  attribute max_fanout : string;
+
+  attribute max_fanout of pipe_rst, sweep_valid, sweep_row_first : signal is C_FANOUT;
 begin
 
   -- Ranges of the other generics are checked by the entities that use them.
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "psweep: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "psweep: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
 
   pipe_rst <= rst or map_abort;
@@ -252,6 +262,7 @@ begin
       s_pix_tready  => s_pix_tready,
       s_pix_tlast   => s_pix_tlast,
       cfg_data      => cfg_data,
+      cfg_parity    => cfg_parity,
       table_we      => table_we,
       table_addr    => table_addr,
       offset_we     => offset_we,
@@ -285,6 +296,7 @@ begin
       map_valid     => map_valid,
       map_last      => unload_done,
       window_error  => address_window_error,
+      word_error    => address_word_error,
       state         => state,
       busy          => busy,
       errors        => errors,
@@ -324,6 +336,7 @@ begin
         offset_we        => offset_we,
         offset_addr      => offset_addr,
         cfg_data         => cfg_data,
+        cfg_parity       => cfg_parity,
         win_last_col     => win_last_col,
         win_last_row     => win_last_row,
         left_x_lo        => left_x_lo,
@@ -357,7 +370,8 @@ begin
         m_row_odd_right  => address_row_odd_right((lane + 1) * C_BANK_W - 1 downto lane * C_BANK_W),
         m_usable_x       => address_usable_x(lane),
         m_usable_y       => address_usable_y(lane),
-        m_window_error   => address_window_error(lane)
+        m_window_error   => address_window_error(lane),
+        m_word_error     => address_word_error(lane)
       );
 
   end generate g_address;

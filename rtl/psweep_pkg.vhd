@@ -40,6 +40,17 @@ package psweep_pkg is
   constant C_ADDRESS_LATENCY       : positive := 9; -- row strobe to position
   constant C_STORAGE_LATENCY       : positive := 4; -- position to 2x2 pixels
 
+  -- RAM of up to so many words is made of LUTs (ram_sdp).
+  constant C_LUT_WORDS : positive := 64;
+
+  -- Values of attributes for the FPGA tools. docs/flows.md lists where they are and why; 'lint attributes' compares.
+  constant C_RAM_BLOCK : string := "block";       -- ram_style
+  constant C_RAM_LUT   : string := "distributed"; -- ram_style
+  constant C_DSP       : string := "yes";         -- use_dsp48
+  constant C_FANOUT    : string := "100";         -- max_fanout
+  constant C_PAD       : string := "TRUE";        -- iob
+  constant C_FSM_KEPT  : string := "no";          -- fsm_extract
+
   -- Pixels to sample. A build for rectified pairs has no interpolation between rows.
   function interpolation_latency (rectified : integer) return positive;
 

@@ -113,16 +113,32 @@ architecture rtl of psweep_top is
 begin
 
   assert G_MAC_HI >= 0 and G_MAC_HI <= 16777215
-    report "psweep_top: G_MAC_HI=" & integer'image(G_MAC_HI) & " outside 0..16777215"
+    report "psweep_top: G_MAC_HI"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAC_HI)
+           -- synthesis translate_on
+           & " outside 0..16777215"
     severity failure;
   assert G_MAC_LO >= 0 and G_MAC_LO <= 16777215
-    report "psweep_top: G_MAC_LO=" & integer'image(G_MAC_LO) & " outside 0..16777215"
+    report "psweep_top: G_MAC_LO"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAC_LO)
+           -- synthesis translate_on
+           & " outside 0..16777215"
     severity failure;
   assert G_IP_HI >= 0 and G_IP_HI <= 65535
-    report "psweep_top: G_IP_HI=" & integer'image(G_IP_HI) & " outside 0..65535"
+    report "psweep_top: G_IP_HI"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IP_HI)
+           -- synthesis translate_on
+           & " outside 0..65535"
     severity failure;
   assert G_IP_LO >= 0 and G_IP_LO <= 65535
-    report "psweep_top: G_IP_LO=" & integer'image(G_IP_LO) & " outside 0..65535"
+    report "psweep_top: G_IP_LO"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IP_LO)
+           -- synthesis translate_on
+           & " outside 0..65535"
     severity failure;
 
   own_mac <= std_logic_vector(to_unsigned(G_MAC_HI, 24))

@@ -5,7 +5,7 @@
 --   Latency   : 2 clocks from a_addr to a_rdata and from b_addr to b_rdata (with the output registers of the blocks)
 --   Parts     : as ram_deep with latency 2: the choice among them lies behind these registers
 --   Collision : in the clock of a write a_rdata is undefined, and so is b_rdata if b_addr is the word written ('X' in
---               simulation)
+--               simulation; synthesis sees a port that does not change while it writes and one that reads the old word)
 --   Addresses : 0 .. G_DEPTH-1 in every clock, whether or not the data are used; beyond, a simulation stops
 --   Reset     : none; contents survive reset. Zero at the start of a VHDL simulation, random in the Verilated model
 library ieee;
@@ -76,10 +76,18 @@ architecture rtl of ram_2r is
 begin
 
   assert G_DATA_W >= 1
-    report "ram_2r: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    report "ram_2r: G_DATA_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DATA_W)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_DEPTH >= 1
-    report "ram_2r: G_DEPTH=" & integer'image(G_DEPTH) & " below 1"
+    report "ram_2r: G_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
 
   a_now <= behind(a_addr);
@@ -97,6 +105,10 @@ begin
     -- synthesis translate_on
       ;
 
+    attribute ram_style : string;
+
+    attribute ram_style of memory : signal is C_RAM_BLOCK;
+
     signal we     : std_logic;
     signal a_low  : std_logic_vector(C_PART_W - 1 downto 0);
     signal b_low  : std_logic_vector(C_PART_W - 1 downto 0);
@@ -113,15 +125,19 @@ begin
       if rising_edge(clk) then
         if we = '1' then
           memory(to_integer(unsigned(a_low))) <= a_wdata;
-          a_word <= (others => 'X');
         else
           a_word <= memory(to_integer(unsigned(a_low)));
         end if;
-        if we = '1' and a_low = b_low then
-          b_word <= (others => 'X');
-        else
-          b_word <= memory(to_integer(unsigned(b_low)));
+        b_word <= memory(to_integer(unsigned(b_low)));
+        -- synthesis translate_off
+        -- collision: kept in the Verilated models
+        if we = '1' then
+          a_word <= (others => 'X');
+          if a_low = b_low then
+            b_word <= (others => 'X');
+          end if;
         end if;
+        -- synthesis translate_on
       end if;
     end process p_memory;
 

@@ -38,13 +38,25 @@ architecture rtl of ram_dc is
   -- synthesis translate_on
     ;
 
+  attribute ram_style : string;
+
+  attribute ram_style of memory : signal is C_RAM_BLOCK;
+
 begin
 
   assert G_DATA_W >= 1
-    report "ram_dc: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    report "ram_dc: G_DATA_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DATA_W)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_DEPTH >= 1
-    report "ram_dc: G_DEPTH=" & integer'image(G_DEPTH) & " below 1"
+    report "ram_dc: G_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
 
   p_write : process (w_clk)

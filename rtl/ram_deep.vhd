@@ -56,24 +56,39 @@ architecture rtl of ram_deep is
 
   signal w_behind : t_parts;
   signal r_behind : t_parts;
+  -- What the parts show, with latency 2 from their output registers.
   signal words    : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
-  -- What rdata is chosen from: words, or the registers behind them.
-  signal shown    : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
   signal chosen   : t_parts;
 
 begin
 
   assert G_DATA_W >= 1
-    report "ram_deep: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    report "ram_deep: G_DATA_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DATA_W)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_DEPTH >= 2
-    report "ram_deep: G_DEPTH=" & integer'image(G_DEPTH) & " below 2"
+    report "ram_deep: G_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH)
+           -- synthesis translate_on
+           & " below 2"
     severity failure;
   assert G_NINES >= 0 and G_NINES <= G_DATA_W and G_NINES mod 9 = 0
-    report "ram_deep: G_NINES=" & integer'image(G_NINES) & " is no multiple of 9 up to G_DATA_W"
+    report "ram_deep: G_NINES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_NINES)
+           -- synthesis translate_on
+           & " is no multiple of 9 up to G_DATA_W"
     severity failure;
   assert G_LATENCY >= 1 and G_LATENCY <= 2
-    report "ram_deep: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..2"
+    report "ram_deep: G_LATENCY"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LATENCY)
+           -- synthesis translate_on
+           & " outside 1..2"
     severity failure;
 
   w_behind <= behind(waddr);
@@ -90,7 +105,7 @@ begin
     g_one : if not C_SPLIT generate
 
       u_part : entity work.ram_sdp
-        generic map (G_DATA_W => G_DATA_W, G_DEPTH => C_SIZE, G_LATENCY => 1)
+        generic map (G_DATA_W => G_DATA_W, G_DEPTH => C_SIZE, G_LATENCY => G_LATENCY)
         port map (
           clk   => clk,
           we    => we_part,
@@ -105,7 +120,7 @@ begin
     g_two : if C_SPLIT generate
 
       u_nines : entity work.ram_sdp
-        generic map (G_DATA_W => G_NINES, G_DEPTH => C_SIZE, G_LATENCY => 1)
+        generic map (G_DATA_W => G_NINES, G_DEPTH => C_SIZE, G_LATENCY => G_LATENCY)
         port map (
           clk   => clk,
           we    => we_part,
@@ -116,7 +131,7 @@ begin
         );
 
       u_rest : entity work.ram_sdp
-        generic map (G_DATA_W => G_DATA_W - G_NINES, G_DEPTH => C_SIZE, G_LATENCY => 1)
+        generic map (G_DATA_W => G_DATA_W - G_NINES, G_DEPTH => C_SIZE, G_LATENCY => G_LATENCY)
         port map (
           clk   => clk,
           we    => we_part,
@@ -149,28 +164,26 @@ begin
   end process p_part;
 
   g_direct : if G_LATENCY = 1 generate
-    shown  <= words;
     chosen <= r_behind;
   end generate g_direct;
 
   g_output_register : if G_LATENCY /= 1 generate
 
-    p_output : process (clk)
+    p_chosen : process (clk)
     begin
       if rising_edge(clk) then
-        shown  <= words;
         chosen <= r_behind;
       end if;
-    end process p_output;
+    end process p_chosen;
 
   end generate g_output_register;
 
-  p_pick : process (shown, chosen)
+  p_pick : process (words, chosen)
   begin
-    rdata <= shown(G_DATA_W - 1 downto 0);
+    rdata <= words(G_DATA_W - 1 downto 0);
     for i in 1 to C_PARTS - 1 loop
       if chosen(i) = '1' then
-        rdata <= shown((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
+        rdata <= words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
       end if;
     end loop;
   end process p_pick;

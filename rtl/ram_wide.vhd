@@ -5,7 +5,8 @@
 --           words beside them and one block of 16384 * 2 bits, where 16384 * 2 bits alone would be 10 blocks.
 --   Otherwise : where that takes no block less, more than 32 words lie behind or the multiplexer has more than eight
 --               inputs, just a ram_sdp
---   Latency   : G_LATENCY = 1 or 2 clocks; the multiplexer is behind the blocks, in front of the second register
+--   Latency   : G_LATENCY = 1 or 2 clocks; the multiplexer is behind the blocks, in front of the second register. The
+--               bits above have the output register of their blocks (ram_sdp)
 --   Others    : collision, addresses and reset as ram_sdp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -62,13 +63,25 @@ architecture rtl of ram_wide is
 begin
 
   assert G_DATA_W >= 1
-    report "ram_wide: G_DATA_W=" & integer'image(G_DATA_W) & " below 1"
+    report "ram_wide: G_DATA_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DATA_W)
+           -- synthesis translate_on
+           & " below 1"
     severity failure;
   assert G_DEPTH >= 2
-    report "ram_wide: G_DEPTH=" & integer'image(G_DEPTH) & " below 2"
+    report "ram_wide: G_DEPTH"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DEPTH)
+           -- synthesis translate_on
+           & " below 2"
     severity failure;
   assert G_LATENCY >= 1 and G_LATENCY <= 2
-    report "ram_wide: G_LATENCY=" & integer'image(G_LATENCY) & " outside 1..2"
+    report "ram_wide: G_LATENCY"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LATENCY)
+           -- synthesis translate_on
+           & " outside 1..2"
     severity failure;
 
   g_one : if not C_SPLIT generate
@@ -82,12 +95,13 @@ begin
   g_split : if C_SPLIT generate
     constant C_BLOCK_W : integer := clog2(C_BLOCK);
     constant C_PICK_W  : integer := clog2(C_PARTS);
+    constant C_WAYS    : integer := 2 ** C_PICK_W;        -- inputs of the multiplexer
     signal r_part : std_logic_vector(C_PICK_W - 1 downto 0);
-    signal words  : std_logic_vector(2 ** C_PICK_W * C_LOW_W - 1 downto 0);
-    signal word   : std_logic_vector(G_DATA_W - 1 downto 0);
+    signal words  : std_logic_vector(C_WAYS * C_LOW_W - 1 downto 0);
+    signal word   : std_logic_vector(C_LOW_W - 1 downto 0);
   begin
 
-    g_parts : for i in 0 to 2 ** C_PICK_W - 1 generate
+    g_parts : for i in 0 to C_WAYS - 1 generate
       signal we_part : std_logic;
     begin
 
@@ -121,14 +135,14 @@ begin
     g_top : if C_TOP_W > 0 generate
 
       u_top : entity work.ram_sdp
-        generic map (G_DATA_W => C_TOP_W, G_DEPTH => G_DEPTH, G_LATENCY => 1)
+        generic map (G_DATA_W => C_TOP_W, G_DEPTH => G_DEPTH, G_LATENCY => G_LATENCY)
         port map (
           clk   => clk,
           we    => we,
           waddr => waddr,
           wdata => wdata(G_DATA_W - 1 downto C_LOW_W),
           raddr => raddr,
-          rdata => word(G_DATA_W - 1 downto C_LOW_W)
+          rdata => rdata(G_DATA_W - 1 downto C_LOW_W)
         );
 
     end generate g_top;
@@ -142,11 +156,11 @@ begin
 
     -- A tree, which becomes one LUT6 for four parts.
     p_pick : process (words, r_part)
-      variable v_words : std_logic_vector(2 ** C_PICK_W * C_LOW_W - 1 downto 0);
+      variable v_words : std_logic_vector(C_WAYS * C_LOW_W - 1 downto 0);
     begin
       v_words := words;
       for level in 0 to C_PICK_W - 1 loop
-        for i in 0 to 2 ** (C_PICK_W - 1 - level) - 1 loop
+        for i in 0 to C_WAYS / 2 ** (level + 1) - 1 loop
           if r_part(level) = '1' then
             v_words((i + 1) * C_LOW_W - 1 downto i * C_LOW_W)
               := v_words((2 * i + 2) * C_LOW_W - 1 downto (2 * i + 1) * C_LOW_W);
@@ -156,11 +170,11 @@ begin
           end if;
         end loop;
       end loop;
-      word(C_LOW_W - 1 downto 0) <= v_words(C_LOW_W - 1 downto 0);
+      word <= v_words(C_LOW_W - 1 downto 0);
     end process p_pick;
 
     g_direct : if G_LATENCY = 1 generate
-      rdata <= word;
+      rdata(C_LOW_W - 1 downto 0) <= word;
     end generate g_direct;
 
     g_output_register : if G_LATENCY /= 1 generate
@@ -168,7 +182,7 @@ begin
       p_output : process (clk)
       begin
         if rising_edge(clk) then
-          rdata <= word;
+          rdata(C_LOW_W - 1 downto 0) <= word;
         end if;
       end process p_output;
 

@@ -19,6 +19,10 @@ architecture rtl of reset_sync is
 
   signal stages : std_logic_vector(2 downto 0);
 
+  attribute keep : string;
+
+  attribute keep of stages : signal is "TRUE";
+
   attribute async_reg     : string;
   attribute shreg_extract : string;
 

@@ -384,19 +384,39 @@ architecture rtl of responder is
   signal map_wait   : unsigned(7 downto 0);
   signal rows_short : std_logic;
 
+  attribute fsm_extract : string;
+
+  attribute fsm_extract of state : signal is C_FSM_KEPT;
+
 begin
 
   assert G_CLK_KHZ >= 1000 and G_CLK_KHZ <= 1000000
-    report "responder: G_CLK_KHZ=" & integer'image(G_CLK_KHZ) & " outside 1000..1000000"
+    report "responder: G_CLK_KHZ"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CLK_KHZ)
+           -- synthesis translate_on
+           & " outside 1000..1000000"
     severity failure;
   assert G_CHUNK_BYTES >= 16 and G_CHUNK_BYTES <= 1440
-    report "responder: G_CHUNK_BYTES=" & integer'image(G_CHUNK_BYTES) & " outside 16..1440"
+    report "responder: G_CHUNK_BYTES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_BYTES)
+           -- synthesis translate_on
+           & " outside 16..1440"
     severity failure;
   assert G_ROW_SLOTS >= 2 and G_ROW_SLOTS <= 1024
-    report "responder: G_ROW_SLOTS=" & integer'image(G_ROW_SLOTS) & " outside 2..1024"
+    report "responder: G_ROW_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_ROW_SLOTS)
+           -- synthesis translate_on
+           & " outside 2..1024"
     severity failure;
   assert G_SESSION_MS >= 1 and G_SESSION_MS <= 65535
-    report "responder: G_SESSION_MS=" & integer'image(G_SESSION_MS) & " outside 1..65535"
+    report "responder: G_SESSION_MS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SESSION_MS)
+           -- synthesis translate_on
+           & " outside 1..65535"
     severity failure;
 
   -- Reading ----------------------------------------------------------------------------------------------------------

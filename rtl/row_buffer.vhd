@@ -151,14 +151,26 @@ architecture rtl of row_buffer is
 begin
 
   assert G_PIX_W >= 1 and G_PIX_W <= 12
-    report "row_buffer: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    report "row_buffer: G_PIX_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PIX_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   -- With 1 there would be no clock to look ahead for the next chunk.
   assert G_CHUNK_PAIRS >= 2 and G_CHUNK_PAIRS <= 2048
-    report "row_buffer: G_CHUNK_PAIRS=" & integer'image(G_CHUNK_PAIRS) & " outside 2..2048"
+    report "row_buffer: G_CHUNK_PAIRS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CHUNK_PAIRS)
+           -- synthesis translate_on
+           & " outside 2..2048"
     severity failure;
   assert G_SLOTS >= 2 and G_SLOTS <= 1024
-    report "row_buffer: G_SLOTS=" & integer'image(G_SLOTS) & " outside 2..1024"
+    report "row_buffer: G_SLOTS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SLOTS)
+           -- synthesis translate_on
+           & " outside 2..1024"
     severity failure;
 
   -- Tile -------------------------------------------------------------------------------------------------------------

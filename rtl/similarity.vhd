@@ -13,6 +13,8 @@
 --   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
 --             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
+--             Accumulators of slices begin with 0. The -1 that makes an inverted denominator of a negative one is in
+--             S(l)^2 - 1 = (S(l) + 1)(S(l) - 1): S(l) - 1 is accumulated, the adder before the multiplier adds 2
 --   Rate    : one sample per clock; cells leave in raster order
 --   Latency : similarity_latency(G_MNCC_W) clocks from the last sample of a window to its cell (psweep_pkg)
 --   Numbers : samples ufix(G_SAMPLE_W,0); all sums exact; operands of the division truncated to G_MNCC_W+3 bits, the
@@ -173,7 +175,7 @@ architecture rtl of similarity is
   signal s7_flags   : std_logic_vector(1 downto 0);
 
   -- s7, s8: new column - column that leaves; the other way round for x and y, because a constant factor below 0 would
-  -- be converted wrongly. s8: window sums of l' and r'
+  -- be converted wrongly. s8: window sums of l', less 1, and of r'
   signal s7_dl        : signed(C_CL_W downto 0);
   signal s7_dr        : signed(C_CL_W downto 0);
   signal s8_valid     : std_logic;
@@ -187,14 +189,15 @@ architecture rtl of similarity is
   signal s9_valid     : std_logic;
   signal s9_cell      : std_logic;
   signal s9_row_first : std_logic;
-  signal s9_l         : signed(C_SL_W - 1 downto 0);
+  signal s9_l         : signed(C_SL_W - 1 downto 0); -- as s8_l
+  signal s9_l_2       : signed(C_SL_W - 1 downto 0); -- S(l) + 1
   signal s9_r         : signed(C_SL_W - 1 downto 0);
   signal s9_n_dx      : signed(C_CX_W + C_NGROW + 1 downto 0);
   signal s9_n_dy      : signed(C_CX_W + C_NGROW + 1 downto 0);
   signal s9_n_low_x   : unsigned(C_LOW_W + C_NGROW - 1 downto 0);
   signal s9_n_low_y   : unsigned(C_LOW_W + C_NGROW - 1 downto 0);
 
-  -- s10: -n S(x), -n S(y) - 1
+  -- s10: -n S(x), -n S(y); S(l)^2 - 1, the -1 of what becomes the denominator inverted
   signal s10_valid : std_logic;
   signal s10_l     : signed(C_SL_W - 1 downto 0);
   signal s10_r     : signed(C_SL_W - 1 downto 0);
@@ -231,6 +234,10 @@ architecture rtl of similarity is
   signal div_quot     : std_logic_vector(G_MNCC_W - 1 downto 0);
   signal div_textured : std_logic_vector(0 downto 0);
   signal flags_out    : std_logic_vector(1 downto 0);
+
+  attribute use_dsp48 : string;
+
+  attribute use_dsp48 of s5_ar, s5_ab, s6_lc, s6_ce, s9_n_dx, s9_n_dy, s10_ll, s11_lr, s11_rr : signal is C_DSP;
 
   -- One usable flag more: the run goes on up to M, or breaks.
   function next_run (run : unsigned; usable : std_logic; restart : std_logic) return unsigned is
@@ -330,22 +337,46 @@ architecture rtl of similarity is
 begin
 
   assert G_WINDOW >= 3 and G_WINDOW <= 21 and G_WINDOW mod 2 = 1
-    report "similarity: G_WINDOW=" & integer'image(G_WINDOW) & " outside 3..21 or even"
+    report "similarity: G_WINDOW"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WINDOW)
+           -- synthesis translate_on
+           & " outside 3..21 or even"
     severity failure;
   assert G_SAMPLE_W >= 1 and G_SAMPLE_W <= 20
-    report "similarity: G_SAMPLE_W=" & integer'image(G_SAMPLE_W) & " outside 1..20"
+    report "similarity: G_SAMPLE_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SAMPLE_W)
+           -- synthesis translate_on
+           & " outside 1..20"
     severity failure;
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
-    report "similarity: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    report "similarity: G_MNCC_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MNCC_W)
+           -- synthesis translate_on
+           & " outside 4..16"
     severity failure;
   assert G_DIVIDER = 0 or G_DIVIDER = 1
-    report "similarity: G_DIVIDER=" & integer'image(G_DIVIDER) & " is neither 0 nor 1"
+    report "similarity: G_DIVIDER"
+           -- synthesis translate_off
+           & "=" & integer'image(G_DIVIDER)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
   assert G_SPLIT = 0 or G_SPLIT = 1
-    report "similarity: G_SPLIT=" & integer'image(G_SPLIT) & " is neither 0 nor 1"
+    report "similarity: G_SPLIT"
+           -- synthesis translate_off
+           & "=" & integer'image(G_SPLIT)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
   assert G_MAX_COLS >= G_WINDOW and G_MAX_COLS <= 4096
-    report "similarity: G_MAX_COLS=" & integer'image(G_MAX_COLS) & " outside G_WINDOW..4096"
+    report "similarity: G_MAX_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MAX_COLS)
+           -- synthesis translate_on
+           & " outside G_WINDOW..4096"
     severity failure;
 
   -- s1 ---------------------------------------------------------------------------------------------------------------
@@ -669,7 +700,7 @@ begin
         v_l := s8_l;
         v_r := s8_r;
         if s7_flags(0) = '1' then
-          v_l := (others => '0');
+          v_l := (others => s7_flags(0)); -- ones; as a constant of this width they would be converted wrongly
           v_r := (others => '0');
         end if;
         s8_l <= v_l + resize(s7_dl, C_SL_W);
@@ -680,6 +711,7 @@ begin
       s9_cell      <= s8_flags(1);
       s9_row_first <= s8_flags(0);
       s9_l         <= s8_l;
+      s9_l_2       <= s8_l + 2;
       s9_r         <= s8_r;
       if C_SPLIT then
         s9_n_dx    <= resize(s8_dx(C_CX_W downto C_LOW_W) * to_signed(C_N, C_NGROW + 1), s9_n_dx'length);
@@ -692,15 +724,15 @@ begin
       end if;
       -- s10
       s10_valid <= s9_valid and s9_cell;
-      s10_l     <= s9_l;
+      s10_l     <= s9_l + 1;
       s10_r     <= s9_r;
-      s10_ll    <= s9_l * s9_l;
+      s10_ll    <= s9_l_2 * s9_l;
       if s9_valid = '1' then
         v_x := s10_x;
         v_y := s10_y;
         if s9_row_first = '1' then
           v_x := (others => '0');
-          v_y := (others => s9_row_first); -- ones; as a constant of this width they would be converted wrongly
+          v_y := (others => '0');
         end if;
         if C_SPLIT then
           s10_x <= v_x + fit(s9_n_dx & to_signed(0, C_LOW_W), C_DEN_W) + fit(signed('0' & s9_n_low_x), C_DEN_W);
@@ -910,7 +942,7 @@ begin
         report "similarity: the sums of a column are unknown: never written, or read in the clock of their write"
         severity failure;
       if s8_valid = '1' and s8_flags(1) = '1' then
-        assert s8_l >= -C_N * 2 ** (G_SAMPLE_W - 1) and s8_l < C_N * 2 ** (G_SAMPLE_W - 1)
+        assert s8_l >= -C_N * 2 ** (G_SAMPLE_W - 1) - 1 and s8_l < C_N * 2 ** (G_SAMPLE_W - 1) - 1
           report "similarity: the sum of l is out of range"
           severity failure;
         assert s8_r >= -C_N * 2 ** (G_SAMPLE_W - 1) and s8_r < C_N * 2 ** (G_SAMPLE_W - 1)

@@ -8,7 +8,8 @@
 --              and 3 have a second copy. So two lanes need no more RAM than one, and no lane depends on where another
 --              reads
 --   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator. With
---              lanes that write and read through one port the row part must be 0 while a pixel is written
+--              lanes that write and read through one port a pixel is written a clock later, and then the row part must
+--              be 0 and no sample come
 --   Rectified: G_RECTIFIED = 1: samples lie on rows of pixels; two banks an image, by the parity of x, hold all rows:
 --              y * G_IMG_COLS/2 + x div 2. Same RAM, but half the addresses and a 2:1 choice of pixels. p01, p11 are 0
 --   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W) passed through
@@ -100,6 +101,10 @@ architecture rtl of storage is
   signal write_addr : std_logic_vector(C_BANK_W - 1 downto 0);
   signal write_data : std_logic_vector(2 * G_PIX_W - 1 downto 0);
   signal write_bank : std_logic_vector(3 downto 0); -- one-hot: 2 * (y mod 2) + x mod 2
+  -- With several lanes, a clock behind: the address takes its way through a reader.
+  signal write_any  : std_logic;                    -- write_bank is not 0
+  signal pair_data  : std_logic_vector(2 * G_PIX_W - 1 downto 0);
+  signal pair_bank  : std_logic_vector(3 downto 0);
   signal load_lower : std_logic; -- into banks 2 and 3
 
   -- Both images behind each other, all lanes of the left one in the low half, so that one generate serves both.
@@ -150,22 +155,46 @@ architecture rtl of storage is
 begin
 
   assert G_IMG_COLS >= 4 and G_IMG_COLS <= 4096 and G_IMG_COLS mod 2 = 0
-    report "storage: G_IMG_COLS=" & integer'image(G_IMG_COLS) & " outside 4..4096 or odd"
+    report "storage: G_IMG_COLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_COLS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_IMG_ROWS >= 4 and G_IMG_ROWS <= 4096 and G_IMG_ROWS mod 2 = 0
-    report "storage: G_IMG_ROWS=" & integer'image(G_IMG_ROWS) & " outside 4..4096 or odd"
+    report "storage: G_IMG_ROWS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_IMG_ROWS)
+           -- synthesis translate_on
+           & " outside 4..4096 or odd"
     severity failure;
   assert G_PIX_W >= 1 and G_PIX_W <= 12
-    report "storage: G_PIX_W=" & integer'image(G_PIX_W) & " outside 1..12"
+    report "storage: G_PIX_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PIX_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_WEIGHT_W >= 1 and G_WEIGHT_W <= 12
-    report "storage: G_WEIGHT_W=" & integer'image(G_WEIGHT_W) & " outside 1..12"
+    report "storage: G_WEIGHT_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_WEIGHT_W)
+           -- synthesis translate_on
+           & " outside 1..12"
     severity failure;
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "storage: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "storage: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
   assert G_RECTIFIED = 0 or G_RECTIFIED = 1
-    report "storage: G_RECTIFIED=" & integer'image(G_RECTIFIED) & " is neither 0 nor 1"
+    report "storage: G_RECTIFIED"
+           -- synthesis translate_off
+           & "=" & integer'image(G_RECTIFIED)
+           -- synthesis translate_on
+           & " is neither 0 nor 1"
     severity failure;
 
   load_lower <= load_row_odd and not C_RECTIFIED;
@@ -185,8 +214,13 @@ begin
       elsif load_valid = '1' and load_row_end = '1' and (load_row_odd = '1' or G_RECTIFIED = 1) then
         write_row <= write_row + C_PITCH;
       end if;
+      write_any <= load_valid;
+      pair_data <= write_data;
+      pair_bank <= write_bank;
       if rst = '1' then
         write_bank <= (others => '0');
+        write_any  <= '0';
+        pair_bank  <= (others => '0');
       end if;
     end if;
   end process p_load;
@@ -216,7 +250,7 @@ begin
     signal p10      : std_logic_vector(G_PIX_W - 1 downto 0);
     signal p01      : std_logic_vector(G_PIX_W - 1 downto 0);
     signal p11      : std_logic_vector(G_PIX_W - 1 downto 0);
-    -- The port of an even lane writes the pixel that comes: its address takes the column's place, the row's is 0.
+    -- The port of an even lane writes the pixels: their address takes the column's place, the row's is 0.
     signal writes   : std_logic;
     signal column   : std_logic_vector(C_BANK_W - 1 downto 0);
     signal round_up : std_logic;
@@ -225,8 +259,8 @@ begin
     row_even <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     row_odd  <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     xi       <= s0_xi(n * C_INT_W + C_COL_W - 1 downto n * C_INT_W);
-    writes   <= load_valid and to_bit(G_LANES > 1 and n mod 2 = 0);
-    column   <= write_next when writes = '1'
+    writes   <= write_any and to_bit(G_LANES > 1 and n mod 2 = 0);
+    column   <= write_addr when writes = '1'
                 else std_logic_vector(resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W));
     round_up <= xi(0) and not writes;
 
@@ -269,9 +303,11 @@ begin
 
   g_image : for image in 0 to 1 generate
     signal write_pixel : std_logic_vector(G_PIX_W - 1 downto 0);
+    signal pair_pixel  : std_logic_vector(G_PIX_W - 1 downto 0);
   begin
 
     write_pixel <= write_data((image + 1) * G_PIX_W - 1 downto image * G_PIX_W);
+    pair_pixel  <= pair_data((image + 1) * G_PIX_W - 1 downto image * G_PIX_W);
 
     g_one : if G_LANES = 1 generate
 
@@ -336,9 +372,9 @@ begin
           generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
           port map (
             clk     => clk,
-            a_we    => write_bank(0),
+            a_we    => pair_bank(0),
             a_addr  => s1_addr_0((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-            a_wdata => write_pixel,
+            a_wdata => pair_pixel,
             a_rdata => s3_word_0((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
             b_addr  => s1_addr_0((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
             b_rdata => s3_word_0((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
@@ -348,9 +384,9 @@ begin
           generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
           port map (
             clk     => clk,
-            a_we    => write_bank(1),
+            a_we    => pair_bank(1),
             a_addr  => s1_addr_1((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-            a_wdata => write_pixel,
+            a_wdata => pair_pixel,
             a_rdata => s3_word_1((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
             b_addr  => s1_addr_1((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
             b_rdata => s3_word_1((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
@@ -362,9 +398,9 @@ begin
             generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
             port map (
               clk     => clk,
-              a_we    => write_bank(2),
+              a_we    => pair_bank(2),
               a_addr  => s1_addr_2((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-              a_wdata => write_pixel,
+              a_wdata => pair_pixel,
               a_rdata => s3_word_2((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
               b_addr  => s1_addr_2((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
               b_rdata => s3_word_2((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
@@ -374,9 +410,9 @@ begin
             generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
             port map (
               clk     => clk,
-              a_we    => write_bank(3),
+              a_we    => pair_bank(3),
               a_addr  => s1_addr_3((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-              a_wdata => write_pixel,
+              a_wdata => pair_pixel,
               a_rdata => s3_word_3((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
               b_addr  => s1_addr_3((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
               b_rdata => s3_word_3((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
@@ -462,10 +498,10 @@ begin
     p_rules : process (clk)
     begin
       if rising_edge(clk) then
-        assert load_valid /= '1' or s_valid(n) /= '1'
+        assert (load_valid or (write_any and to_bit(G_LANES > 1))) /= '1' or s_valid(n) /= '1'
           report "storage: a pixel is written while samples are read"
           severity failure;
-        assert load_valid /= '1' or G_LANES = 1 or n mod 2 = 1
+        assert write_any /= '1' or G_LANES = 1 or n mod 2 = 1
                or unsigned(s_row_even_left((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)
                            or s_row_odd_left((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)
                            or s_row_even_right((n + 1) * C_BANK_W - 1 downto n * C_BANK_W)

@@ -174,21 +174,41 @@ architecture rtl of updating is
 begin
 
   assert G_CELLS >= 1 and G_CELLS <= 2 ** 22
-    report "updating: G_CELLS=" & integer'image(G_CELLS) & " outside 1..4194304"
+    report "updating: G_CELLS"
+           -- synthesis translate_off
+           & "=" & integer'image(G_CELLS)
+           -- synthesis translate_on
+           & " outside 1..4194304"
     severity failure;
   assert G_PLANES >= 1 and G_PLANES <= 1024
-    report "updating: G_PLANES=" & integer'image(G_PLANES) & " outside 1..1024"
+    report "updating: G_PLANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_PLANES)
+           -- synthesis translate_on
+           & " outside 1..1024"
     severity failure;
   assert G_MNCC_W >= 4 and G_MNCC_W <= 16
-    report "updating: G_MNCC_W=" & integer'image(G_MNCC_W) & " outside 4..16"
+    report "updating: G_MNCC_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_MNCC_W)
+           -- synthesis translate_on
+           & " outside 4..16"
     severity failure;
   -- The loop of updating_latency clocks must close within a plane of 3 C_ROW_MIN.
   assert G_FRAC_W >= 2 and G_FRAC_W <= 12
-    report "updating: G_FRAC_W=" & integer'image(G_FRAC_W) & " outside 2..12"
+    report "updating: G_FRAC_W"
+           -- synthesis translate_off
+           & "=" & integer'image(G_FRAC_W)
+           -- synthesis translate_on
+           & " outside 2..12"
     severity failure;
 
   assert G_LANES = 1 or G_LANES = 2 or G_LANES = 4
-    report "updating: G_LANES=" & integer'image(G_LANES) & " is not 1, 2 or 4"
+    report "updating: G_LANES"
+           -- synthesis translate_off
+           & "=" & integer'image(G_LANES)
+           -- synthesis translate_on
+           & " is not 1, 2 or 4"
     severity failure;
 
   clear <= rst or cancel or start;

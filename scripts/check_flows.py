@@ -165,12 +165,12 @@ def check_sources(work):
 def ghdl(work, files, top, generics, label):
     folder = work / "ghdl-{}".format(label)
     folder.mkdir()
-    call(["ghdl", "-a", "--std=93c", "--workdir={}".format(folder)] + files)
+    call(["ghdl", "-a", "--std=93", "--workdir={}".format(folder)] + files)
     return folder
 
 
 def elaborate(folder, top, generics, code=0):
-    run = subprocess.run(["ghdl", "--synth", "--std=93c", "--workdir={}".format(folder), "--out=verilog", "--no-formal"]
+    run = subprocess.run(["ghdl", "--synth", "--std=93", "--workdir={}".format(folder), "--out=verilog", "--no-formal"]
                          + ["-g{}={}".format(*g) for g in sorted(generics.items())] + [top + "_pins"], cwd=str(ROOT),
                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, universal_newlines=True)
     need((run.returncode == 0) == (code == 0), "{} with {}: GHDL ends with {}\n{}".format(
@@ -903,8 +903,7 @@ def fusesoc(work):
     (user / "user.core").write_text(
         "CAPI=2:\nname: somebody:else:user:1.0\nfilesets:\n  rtl:\n    depend: [psweep:stereo:engine]\n"
         "    files: [user.vhd]\n    file_type: vhdlSource-93\ntargets:\n  default:\n    filesets: [rtl]\n"
-        "    toplevel: user\n    default_tool: ghdl\n    tools: {ghdl: {analyze_options: [-frelaxed],\n"
-        "      run_options: [--ieee-asserts=disable]}}\n")
+        "    toplevel: user\n    default_tool: ghdl\n    tools: {ghdl: {run_options: [--ieee-asserts=disable]}}\n")
     ports = [(n, d, t) for n, d, t in project.ports_of("psweep") if d == "in"]
     (user / "user.vhd").write_text(
         "library ieee;\n  use ieee.std_logic_1164.all;\nentity user is end entity;\narchitecture a of user is\nbegin\n"

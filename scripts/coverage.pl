@@ -44,7 +44,8 @@ sub lines {
     die "coverage: $file counts no line of rtl/\n" unless $seen;
   }
 
-  # Explained holes: file, lines ('- ' and the text, '#2' behind the dash: the second such line), reason.
+  # Explained holes: file, lines ('- ' and the text; as often as there are such holes), reason. By text alone: a number
+  # of a line, or of its like in the file, would be another's after the next edit.
   my (%explained, @bad, $entity, @pending);
   my $list = 'scripts/coverage_holes.txt';
   my $n = 0;
@@ -53,12 +54,12 @@ sub lines {
     $n++;
     next if $line =~ /^#/ || $line !~ /\S/;
     if ($line =~ m{^rtl/(\w+)\.vhd$}) { $entity = $1; @pending = () }
-    elsif ($line =~ /^-(?:#(\d+))? (.*\S)/ && $entity) {
+    elsif ($line =~ /^- (.*\S)/ && $entity) {
       @pending = () if $last_was_reason;
-      my $key = "$entity|" . (($1 // 1) - 1) . '|' . trimmed($2);
-      push @bad, "$list:$n: twice" if $explained{$key};
-      $explained{$key} = {where => "$list:$n", reason => ''};
-      push @pending, $key;
+      my $key = "$entity|" . trimmed($1);
+      $explained{$key} //= {where => "$list:$n", reason => '', number => 0};
+      $explained{$key}{number}++;
+      push @pending, $key unless grep { $_ eq $key } @pending;
     }
     elsif ($line =~ /^  (\S.*)/ && @pending) {
       $explained{$_}{reason} .= "$1 " for @pending;
@@ -70,37 +71,34 @@ sub lines {
   }
   for my $e (values %explained) { push @bad, "$e->{where}: no reason" unless $e->{reason} }
 
-  my ($all, $covered, @table, @holes, @lcov, %used) = (0, 0);
+  my ($all, $covered, @table, @holes, @lcov, %found) = (0, 0);
   for my $name (@order) {
     # Constants and functions of a package belong to elaboration; GHDL counts what it runs after that.
     if (!$run{$name}) { push @table, sprintf("%-20s %s\n", $name, 'no statement that GHDL counts'); next }
     my @text = lines_of("rtl/$name.vhd");
-    my (%nth, @occurrence);
-    push @occurrence, $nth{trimmed($_)}++ for @text;
     my ($total, $hit) = (0, 0);
     push @lcov, "TN:\nSF:rtl/$name.vhd\n";
     for my $number (sort { $a <=> $b } keys %{$run{$name}}) {
       $total++;
       $hit += $run{$name}{$number};
       push @lcov, "DA:$number,$run{$name}{$number}\n";
-      my $key = "$name|$occurrence[$number - 1]|" . trimmed($text[$number - 1]);
-      if ($run{$name}{$number}) {
-        push @bad, "$explained{$key}{where}: no hole, rtl/$name.vhd:$number was run" if $explained{$key};
-        $used{$key} = 1;
-        next;
-      }
-      $used{$key} = 1;
+      next if $run{$name}{$number};
+      my $key = "$name|" . trimmed($text[$number - 1]);
+      my $known = $explained{$key} && ++$found{$key} <= $explained{$key}{number};
       push @holes, sprintf("rtl/%s.vhd:%d: %s\n    %s\n", $name, $number, trimmed($text[$number - 1]),
-                           $explained{$key} ? $explained{$key}{reason} : 'NOT EXPLAINED');
+                           $known ? $explained{$key}{reason} : 'NOT EXPLAINED');
       push @bad, "a hole that $list does not explain: rtl/$name.vhd:$number: " . trimmed($text[$number - 1])
-        unless $explained{$key};
+        unless $known;
     }
     push @lcov, "end_of_record\n";
     push @table, sprintf("%-20s %5d of %5d  %6.2f %%\n", $name, $hit, $total, 100 * $hit / $total);
     $all += $total;
     $covered += $hit;
   }
-  for my $key (sort keys %explained) { push @bad, "$explained{$key}{where}: fits no counted line" unless $used{$key} }
+  for my $key (sort keys %explained) {
+    my $less = $explained{$key}{number} - ($found{$key} // 0);
+    push @bad, "$explained{$key}{where}: $less more than there are holes" if $less > 0;
+  }
   die "coverage: no line was counted\n" unless $all;
   my $percent = 100 * $covered / $all;
   my $sum = sprintf "%-20s %5d of %5d  %6.2f %%\n", 'all', $covered, $all, $percent;

@@ -70,8 +70,8 @@ count_lines() {
   for entity in psweep psweep_top; do
     bench=$build/tb/replay/${entity}_replay.vhd
     mkdir -p "$work/$entity"
-    "$ghdl" -a --std=93c --coverage --workdir="$work/$entity" "${sources[@]}" &&
-      "$ghdl" -a --std=93c --workdir="$work/$entity" "$bench" || return 1
+    "$ghdl" -a --std=93 --coverage --workdir="$work/$entity" "${sources[@]}" &&
+      "$ghdl" -a --std=93 --workdir="$work/$entity" "$bench" || return 1
   done
   export -f replay_one
   export ghdl work build
@@ -89,7 +89,7 @@ replay_one() {
   local name=$1 entity=psweep recording=$build/tb/replay/$1.txt generics begun=$SECONDS
   case $name in chip_*) entity=psweep_top ;; esac
   mapfile -t generics < <(sed -nE 's/^generic ([^ ]+) ([^ ]+)$/-g\1=\2/p' "$recording")
-  "$ghdl" -r --std=93c --coverage --coverage-output="$work/$name.json" --workdir="$work/$entity" "${entity}_replay" \
+  "$ghdl" -r --std=93 --coverage --coverage-output="$work/$name.json" --workdir="$work/$entity" "${entity}_replay" \
     "${generics[@]}" -gG_FILE="$recording" --ieee-asserts=disable > "$work/$name.log" 2>&1 || true
   if ! grep -qE 'replay: [1-9][0-9]* steps, [1-9][0-9]* values compared, 0 differences' "$work/$name.log"; then
     tail -n 5 "$work/$name.log"

@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Upsets of the whole chip: one bit of one register is changed while tiles run over the link (docs/robustness.md).
 
-  scripts/flips_chip.py [--count N] [--seed N] [--jobs N] [--page]
+  scripts/flips_chip.py [--count N] [--seed N] [--jobs N]
 
     --count N   upsets, about (default 20000; every bit of every register at least once)
     --seed N    which clocks (default 1)
-    --jobs N    processes (default: all cores)
-    --page      also rewrite the tables between the marks in docs/robustness.md
+    --jobs N    processes (default: JOBS, or all cores)
 
 Table and sites in build/flips_chip.txt. Exit code 1 if the chip hangs, or if nothing was changed.
 """
@@ -15,14 +14,12 @@ import argparse
 import collections
 import os
 import pathlib
-import re
 import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROGRAM = ROOT / "build/tb/flips/chip_flips"
 RESULT = ROOT / "build/flips_chip.txt"
-PAGE = ROOT / "docs/robustness.md"
 VERDICTS = ("masked", "repeated", "session", "error", "silent", "hang")
 
 
@@ -86,43 +83,11 @@ def bits_text(bits):
     return ", ".join(f"{bit}" if times == 1 else f"{bit} ({times} times)" for bit, times in sorted(bits.items()))
 
 
-def page_block(groups, total, sites):
-    columns = ("upset in", "flips", "masked", "of them resent") + VERDICTS[1:] + ("clocks", "silence")
-    rows = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    for name, c in sorted(groups.items()) + [("all", total)]:
-        v = c.verdict
-        cells = [name, c.flips, v["masked"], c.resent] + [v[w] for w in VERDICTS[1:]] + [c.clocks, c.silence]
-        rows.append("| " + " | ".join(str(cell) for cell in cells) + " |")
-    rows += ["", "Registers outside the engine whose upset made a silent wrong cell, with the number of upsets:", ""]
-    outer = collections.Counter()
-    inner = 0
-    for where, bits in sites["silent"].items():
-        name = where.split(" ", 1)[1]
-        if name.startswith("u_engine."):
-            inner += sum(bits.values())
-        else:
-            outer[name.replace("u_arbiter.", "")] += sum(bits.values())
-    rows += ["| register | upsets |", "|---|---|"]
-    rows += [f"| `{name}` | {times} |" for name, times in sorted(outer.items())] or ["| none | 0 |"]
-    rows += ["", f"In the engine: {inner}, by register in `build/flips_chip.txt`."]
-    return rows
-
-
-def rewrite(block):
-    text = PAGE.read_text()
-    new, times = re.subn(r"(<!-- flips: chip -->\n).*?(<!-- /flips -->\n)",
-                         lambda m: m.group(1) + "\n".join(block) + "\n" + m.group(2), text, flags=re.S)
-    if times != 1:
-        sys.exit(f"flips_chip.py: {PAGE.name} has no marks")
-    PAGE.write_text(new)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=20000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--page", action="store_true")
+    parser.add_argument("--jobs", type=int, default=int(os.environ.get("JOBS") or os.cpu_count() or 1))
     options = parser.parse_args()
     lines, about = run(options)
     groups, total, sites, again = tables(lines)
@@ -133,8 +98,6 @@ def main():
                           f"{again[verdict, where]}")
     RESULT.write_text("\n".join(report) + "\n")
     print("\n".join(report))
-    if options.page:
-        rewrite(page_block(groups, total, sites))
     good = total.flips > 0 and total.verdict["hang"] == 0
     print("flips_chip:", "nothing hangs" if good else "FAILED")
     return 0 if good else 1

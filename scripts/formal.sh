@@ -44,8 +44,8 @@ build_and_prove() {
   name=${name%%[.-]*} # behind a '-': the same properties with other generics
   # shellcheck disable=SC2086
   {
-    ghdl -a --std=93c --workdir="$dir" "$@" &&
-      ghdl --synth --std=93c --no-formal --workdir="$dir" --out=verilog $generics "$top" > "$dir/raw.v"
+    ghdl -a --std=93 --workdir="$dir" "$@" &&
+      ghdl --synth --std=93 --no-formal --workdir="$dir" --out=verilog $generics "$top" > "$dir/raw.v"
   } > "$dir/ghdl.log" 2>&1 || { echo "GHDL failed: $dir/ghdl.log"; return; }
   sed -E 's/always @\(posedge (\w+)\)/always @($global_clock) if (\1)/' "$dir/raw.v" > "$dir/steps.v"
   if grep -qE 'posedge|negedge' "$dir/steps.v"; then echo "an edge in $dir/raw.v was not understood"; return; fi
@@ -158,11 +158,11 @@ for lanes in 1 2; do
   proof $name control "-gG_IMG_COLS=6 -gG_IMG_ROWS=4 -gG_PLANE_COLS=2 -gG_PLANE_ROWS=2 -gG_PLANES=3 -gG_WINDOW=3 \
 -gG_MNCC_W=4 -gG_LANES=$lanes -gG_LATENCY=5" \
     'tile_done tile_drop' 'rtl/psweep_pkg.vhd rtl/control.vhd' \
-    rtl/control.vhd 'start with a table too short' 's/and not config_bad and not table_bad;/and not config_bad;/' \
-    rtl/control.vhd 'a tile too wide allowed' 's/cfg_value <= G_PLANE_COLS\)/cfg_value <= G_PLANE_COLS + 1)/' \
+    rtl/control.vhd 'start with a table too short' "s/if config_bad = '1' or table_bad = '1' then/if config_bad = '1' then/" \
+    rtl/control.vhd 'a tile too wide allowed' 's/to_unsigned\(G_PLANE_COLS, 16\)/to_unsigned(G_PLANE_COLS + 1, 16)/' \
     rtl/control.vhd 'a set too many' 's/plane_set >= last_set or/plane_set > last_set or/' \
     rtl/control.vhd 'a short row' 's/to_unsigned\(C_ROW_MIN - 1, C_COL_W\)/to_unsigned(C_ROW_MIN - 2, C_COL_W)/' \
-    rtl/control.vhd 'long packet not drained' "/elsif event_long = '1' then/{n;s/C_DRAIN/C_IDLE/}" \
+    rtl/control.vhd 'long packet not drained' '/state_q <= C_SWEEP;/{n;n;s/C_DRAIN/C_IDLE/}' \
     rtl/control.vhd 'map unloaded too early' 's/(C_FLUSH +: integer := G_LATENCY) \+ 2/\1/' \
     rtl/control.vhd 'done and dropped' 's/ and not tile_done and not event_short$/ and not event_short/' \
     rtl/control.vhd 'samples after an abort' "s/active +<= '0';\$/active <= active;/"
@@ -173,8 +173,8 @@ check_crossings() {
   local dir=$1
   shift
   {
-    ghdl -a --std=93c --workdir="$dir" "$@" &&
-      ghdl --synth --std=93c --no-formal --workdir="$dir" --out=verilog -gG_PLANE_COLS=16 -gG_PLANE_ROWS=16 \
+    ghdl -a --std=93 --workdir="$dir" "$@" &&
+      ghdl --synth --std=93 --no-formal --workdir="$dir" --out=verilog -gG_PLANE_COLS=16 -gG_PLANE_ROWS=16 \
         -gG_IMG_COLS=40 -gG_IMG_ROWS=40 -gG_PLANES=5 arbiter > "$dir/raw.v"
   } > "$dir/ghdl.log" 2>&1 || { echo "GHDL failed: $dir/ghdl.log"; return; }
   { echo "read_verilog $dir/raw.v"; cat tb/formal/crossings.ys; } > "$dir/proof.ys"

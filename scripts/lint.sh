@@ -11,9 +11,12 @@
 #   files      rtl/files.f lists every VHDL file once
 #   analyse    GHDL takes all files of rtl/files.f as VHDL-93, warnings are errors
 #   vhdl       no construct that the conversion to Verilog breaks (lint_text.pl)
+#   attributes those for the FPGA tools are the ones that docs/flows.md lists (lint_attributes.pl)
 #   units      every entity has a golden model, a test and a page
 #   tables     docs/<entity>.md: contract, diagram; generics and ports are those of the entity (lint_tables.pl)
 #   pages      tables of docs/dse.md are those of docs/dse/*.csv (scripts/dse/pages.py)
+#   evidence   blocks of README and docs are what docs/evidence/*.json makes of them, figures beyond them name their
+#              commit; what is stale is named, which is no failure (scripts/evidence.py)
 #   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
 #              (scripts/cmake/ghdl_netlist.vlt)
@@ -68,9 +71,10 @@ check_files() {
 check_analyse() {
   command -v ghdl > /dev/null || skip "ghdl is not installed" || return
   mkdir "$scratch/work"
-  ghdl -a --std=93c --warn-error --workdir="$scratch/work" "${listed_files[@]}"
+  ghdl -a --std=93 --warn-error --workdir="$scratch/work" "${listed_files[@]}"
 }
 check_vhdl() { scripts/lint_text.pl vhdl "${vhdl_files[@]}"; }
+check_attributes() { scripts/lint_attributes.pl; }
 check_units() { scripts/lint_text.pl units "${vhdl_files[@]}"; }
 check_tables() {
   local units
@@ -80,6 +84,10 @@ check_tables() {
 check_pages() {
   command -v python3 > /dev/null || skip "python3 is not installed" || return
   scripts/dse/pages.py --check
+}
+check_evidence() {
+  command -v python3 > /dev/null || skip "python3 is not installed" || return
+  scripts/evidence.py lint
 }
 check_trace() { scripts/lint_trace.pl; }
 
@@ -102,7 +110,7 @@ verilog_of() {
   shift 3
   if [ $# -ne "$number" ]; then echo "$config: found $# of $number generics"; return 1; fi
   dir=$scratch/$top/$(basename "$config" .json)
-  if cmake -D GHDL=ghdl -D STANDARD=--std=93c -D TOP="$top" -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
+  if cmake -D GHDL=ghdl -D STANDARD=--std=93 -D TOP="$top" -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
     -D "GENERICS=$(IFS='|'; echo "$*")" -D "DIR=$dir" -P scripts/cmake/VhdlToVerilog.cmake &&
     verilator --lint-only -Wall --top-module "$top" scripts/cmake/ghdl_netlist.vlt "$dir/$top.v"; then
     return 0
@@ -149,7 +157,7 @@ check_shell() {
   shellcheck --severity=warning "${scripts[@]}"
 }
 
-checks=(layout text links files analyse vhdl units tables pages trace verilog format shell)
+checks=(layout text links files analyse vhdl attributes units tables pages evidence trace verilog format shell)
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
   --format)
@@ -168,7 +176,7 @@ for check in "${checks[@]}"; do
   # Not in a subshell: skip() leaves its reason.
   "check_$check" > "$scratch/output" 2>&1
   case $? in
-    0) passed=$((passed + 1)) ;;
+    0) passed=$((passed + 1)); grep '^note: ' "$scratch/output" | cut -c1-240 ;;
     77) skipped=$((skipped + 1)); echo "lint: $check: SKIPPED: $reason" ;;
     *) failed=$((failed + 1)); cat "$scratch/output"; echo "lint: $check: FAILED" ;;
   esac

@@ -74,7 +74,7 @@ sub parse_entity {
         if (!defined $width) { complain("$file: port not understood: " . squeeze($_)); next }
         push @{$unit{ports}}, map { [$_, $dir, $width] } split /\s*,\s*/, $names;
     }
-    while ($text =~ /\bassert\s+(.*?)\s+report\s+"$entity: (G_\w+)=/sg) {
+    while ($text =~ /\bassert\s+(.*?)\s+report\s+"$entity: (G_\w+)(?:=|"\s*& "=")/sg) {
         my ($condition, $name) = (squeeze($1), $2);
         complain("$file: two assertions about $name") if exists $unit{range}{$name};
         $unit{range}{$name} = range_of($name, $condition);

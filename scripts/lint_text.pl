@@ -107,6 +107,8 @@ my @vhdl_rules = (
     [ 'port_mode', qr/:\s*(buffer|inout)\b/, 'only in and out' ],
     [ 'generic_type', qr/\bg_\w+\s*:\s*(string|real|time)\b/, 'garbles netlist names: integer or boolean' ],
     [ 'library', qr/\bstd_logic_(arith|signed|unsigned)\b/, 'not a standard package: numeric_std' ],
+    [ 'image', qr/'image\b/, "XST's parser may not take it: between translate_off and translate_on" ],
+    [ 'unknown', qr/'x'/, 'no vendor has it in a template: between translate_off and translate_on' ],
     [ 'reserved', qr/\b(?:signal|variable|constant|entity|type|subtype|function|procedure|component)\s+($reserved)\b/,
         'a Verilog keyword' ],
     [ 'reserved', qr/(?:^|[;(])\s*($reserved)\s*:\s*(?:in|out)\b/, 'a Verilog keyword as port' ],
@@ -134,6 +136,8 @@ sub check_vhdl {
         }
     }
     my ($stem) = $file =~ m{([^/]*)\.vhd$};
+    finding($file, 1, 'recursion', 'instantiates itself, which XST takes of components only')
+      if $lower =~ /\bentity\s+work\.$stem\b/;
     my @entities = $lower =~ /^\s*entity\s+(\w+)\s+is\b/mg;
     finding($file, 1, 'one_entity', "entities: @entities, expected $stem")
       unless $stem =~ /_pkg$/ ? !@entities : "@entities" eq $stem;

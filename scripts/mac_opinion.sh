@@ -34,9 +34,9 @@ while read -r file _; do
 done < rtl/files.f
 rm -rf "$out/work"
 mkdir -p "$out/work"
-ghdl -a --std=93c --workdir="$out/work" "${sources[@]}"
+ghdl -a --std=93 --workdir="$out/work" "${sources[@]}"
 for unit in mac_rx mac_tx; do
-  ghdl --synth --std=93c --workdir="$out/work" --out=verilog "$unit" > "$out/$unit.v" 2> "$out/$unit.log" || {
+  ghdl --synth --std=93 --workdir="$out/work" --out=verilog "$unit" > "$out/$unit.v" 2> "$out/$unit.log" || {
     cat "$out/$unit.log" >&2
     exit 1
   }

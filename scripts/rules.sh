@@ -43,7 +43,7 @@ fault() {
     sources+="|$file"
   done
   log=$dir/log
-  timeout 100 cmake -D GHDL="${GHDL:-ghdl}" -D STANDARD=--std=93c -D SOURCES="${sources#|}" \
+  timeout 100 cmake -D GHDL="${GHDL:-ghdl}" -D STANDARD=--std=93 -D SOURCES="${sources#|}" \
     -D BENCH="$build/tb/replay/psweep_replay.vhd" -D FILE="$out/tiny.txt" -D DIR="$dir/work" \
     -P tb/replay/Replay.cmake > "$log" 2>&1 || code=$?
   if [ $code -ne 0 ] && grep -qF "$3" "$log"; then

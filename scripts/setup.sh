@@ -3,7 +3,7 @@
 # Installs the Debian packages of scripts/packages.txt that are missing, and nothing else.
 #
 #   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion,
-#                                                     net, wire, waves, plots, cost, flows, sta, dse
+#                                                     net, wire, waves, plots, cost, flows, sta, dse, evidence
 #     --check  install nothing, name what is missing (exit code 1 if anything is)
 #     --list   print the package names
 #
@@ -24,7 +24,8 @@ for arg in "$@"; do
     --check) mode=check ;;
     --list) mode=list ;;
     -h | --help) usage; exit 0 ;;
-    build | lint | formal | gates | opinion | net | wire | waves | plots | cost | flows | sta | dse) groups+=("$arg") ;;
+    build | lint | formal | gates | opinion | net | wire | waves | plots | cost | flows | sta | dse | evidence)
+      groups+=("$arg") ;;
     *) die "unknown argument '$arg'; see scripts/setup.sh --help" ;;
   esac
 done

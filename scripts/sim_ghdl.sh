@@ -51,7 +51,7 @@ replay() { # replay CONFIGURATION SEED
     "$build/tb/replay/record_engine" > "$log" 2>&1; then
     cat "$log"
     echo "sim-ghdl: $1, seed $2: FAILED: the Verilated engine and the model differ"
-  elif ! cmake -D GHDL="${GHDL:-ghdl}" -D STANDARD=--std=93c -D SOURCES="$sources" \
+  elif ! cmake -D GHDL="${GHDL:-ghdl}" -D STANDARD=--std=93 -D SOURCES="$sources" \
     -D BENCH="$build/tb/replay/psweep_replay.vhd" -D FILE="$recording" -D DIR="$out/$1.$2" \
     -P tb/replay/Replay.cmake > "$log" 2>&1; then
     grep -v '^ *\(in\|from\|call\)' "$log"

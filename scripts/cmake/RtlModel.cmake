@@ -22,7 +22,7 @@ execute_process(
   OUTPUT_VARIABLE PSWEEP_VERILATOR_ROOT
   OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 
-set(PSWEEP_VHDL_STANDARD --std=93c)
+set(PSWEEP_VHDL_STANDARD --std=93)
 # For builds with a purpose of their own (scripts/mutants.sh, scripts/coverage.sh).
 set(PSWEEP_VERILATOR_EXTRA "" CACHE STRING "Further options of Verilator")
 set(PSWEEP_FAST_OPTION -O3 CACHE STRING "Optimisation of models that are built for long runs")

@@ -2,6 +2,9 @@
 # cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> [-D BOTH_EDGES=ON]
 #       [-D EDIT=<Perl or Python script> -D NOTES=<its third file>] -P VhdlToVerilog.cmake
 # Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
+# What stands between translate_off and translate_on behind a comment '-- collision:' is translated all the same: a
+# word that a RAM reads while it is written is random in the models, as it is 'X' in the VHDL, not the old one of the
+# template that synthesis tools see. Such files are copied into DIR.
 # Shows GHDL's messages if it fails or warns; its notes ("found RAM ..") are left out, as is the warning that attributes
 # for the FPGA tools do not reach the Verilog.
 string(REPLACE "|" ";" SOURCES "${SOURCES}")
@@ -17,13 +20,24 @@ function(run_ghdl)
   if(NOT code EQUAL 0)
     message(FATAL_ERROR "ghdl ${TOP} ${GENERICS} failed:\n${text}")
   endif()
-  string(REGEX REPLACE "[^\n]*:warning: unhandled attribute \"(async_reg|shreg_extract)\"\n[^\n]*\n[^\n]*\n" "" text
-                       "${text}")
+  string(REGEX REPLACE "[^\n]*:warning: unhandled attribute \"[a-z0-9_]+\"\n[^\n]*\n[^\n]*\n" "" text "${text}")
   if(text MATCHES ":(warning|error)")
     message("${text}")
   endif()
 endfunction()
-run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${SOURCES})
+set(models)
+foreach(source IN LISTS SOURCES)
+  file(READ ${source} text)
+  string(REGEX REPLACE "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
+                       edited "${text}")
+  if(NOT edited STREQUAL text)
+    get_filename_component(name ${source} NAME)
+    set(source ${DIR}/${name})
+    file(WRITE ${source} "${edited}")
+  endif()
+  list(APPEND models ${source})
+endforeach()
+run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${models})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
 if(EDIT)
   set(interpreter perl)

@@ -159,7 +159,7 @@ def convert(entity, generics, rtl, work):
             raise CostError(f"{entity} has no generic {name}: " + ", ".join(known))
     sources = [str(rtl / f) for f in files[:files.index(f"{entity}.vhd") + 1]]
     (work / "ghdl").mkdir()
-    options = ["--std=93c", f"--workdir={work}/ghdl"]
+    options = ["--std=93", f"--workdir={work}/ghdl"]
 
     def ghdl(*arguments):
         run = subprocess.run(["ghdl", *arguments], capture_output=True, text=True)
@@ -257,8 +257,13 @@ def netlist(entity, family, generics, rtl, path):
         pathlib.Path(path).write_text((work / "netlist.v").read_text())
 
 
+# Nobody uses a word that a RAM of these reads while it is written. The template that synthesis sees returns the old
+# one, which Yosys would build around blocks that do not (ECP5, NG-MEDIUM).
+UNUSED_READS = "setattr -set no_rw_check 1 ram_sdp*/m:* ram_2r*/m:*"
+
+
 def source(top, work):
-    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*"]
+    return [f"read_verilog {work}/top.v", f"delete -output {top}/w:dbg_*", UNUSED_READS]
 
 
 def counted(top, family, no_dsp, work, rows=()):

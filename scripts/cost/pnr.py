@@ -135,8 +135,8 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
         missing = [seed for seed in seeds if not kept[seed].exists()]
         if missing:
             (work / "top.v").write_text(text)
-            cost.run_yosys([f"read_verilog {work}/top.v"] + families.commands("ecp5", "harness", False, work)
-                           + [f"write_json {work}/top.json"], work)
+            cost.run_yosys([f"read_verilog {work}/top.v", cost.UNUSED_READS]
+                           + families.commands("ecp5", "harness", False, work) + [f"write_json {work}/top.json"], work)
             netlist = json.loads((work / "top.json").read_text())
             merged = netlists.merge_output_registers(netlist) + netlists.merge_multiplier_registers(netlist)
             (work / "top.json").write_text(json.dumps(netlist))

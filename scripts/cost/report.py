@@ -212,15 +212,20 @@ def table_families(base):
     return markdown(["", "family", "LUT", "FF", "RAM", "DSP", "carry", "SRL", "LUT RAM or RF"], rows)
 
 
+# Engines whose longest paths are told: one, two and four lanes.
+LEVELS = ("bands", "tile", "tile_2", "tile_4")
+
+
 def table_levels(base):
     rows = []
-    for family in ("xc6v", "xc5v"):
-        found = flat(base, "bands", family)["levels"]["by_unit"]
+    for name, family in (("bands", "xc6v"), ("bands", "xc5v"), *((name, "xc6v") for name in LEVELS if name != "bands")):
+        found = flat(base, name, family)["levels"]["by_unit"]
         for unit in PAPER_UNITS:
             path = found[unit]
-            rows.append([f"{unit}", family, f"**{path['lut']}**" if path["lut"] > 5 else path["lut"], path["carry"],
+            rows.append([POINTS[name]["title"].split(" (")[0], family, f"{unit}",
+                         f"**{path['lut']}**" if path["lut"] > 5 else path["lut"], path["carry"],
                          f"`{tidy(path['start'])}`", f"`{tidy(path['end'])}`"])
-    return markdown(["unit of the end", "family", "LUTs", "carry", "from", "to"], rows)
+    return markdown(["engine", "family", "unit of the end", "LUTs", "carry", "from", "to"], rows)
 
 
 def tidy(name):
@@ -337,9 +342,12 @@ def table_targets(base):
         f"{c['lut']:,} LUT ({shares[0]:.0%}), {num(c['ram36_equivalent'])} RAMB36 ({shares[1]:.0%}), {c['dsp']} DSP "
         f"({shares[2]:.0%}), {mega(frame['clocks'])} M clocks".replace("%", " %"),
         max(shares) <= 0.6 and frame["clocks"] <= 115e6)
-    worst = flat(base, "bands")["levels"]["longest"]["lut"]
-    over = [u for u, p in flat(base, "bands")["levels"]["by_unit"].items() if p["lut"] > 5]
-    row("LUTs on a path, xc6v", "5", f"{worst}" + (": " + ", ".join(over) if over else ""), worst <= 5)
+    for name in LEVELS:
+        levels = flat(base, name)["levels"]
+        worst = levels["longest"]["lut"]
+        over = [u for u, p in levels["by_unit"].items() if p["lut"] > 5]
+        row(f"LUTs on a path, xc6v, {POINTS[name]['title'].split(':')[0].split(' (')[0]}", "5",
+            f"{worst}" + (": " + ", ".join(over) if over else ""), worst <= 5)
     for name, (title, _) in PNR.items():
         two = base.get("pnr", {}).get(name)
         if two and "two lanes" in title:
@@ -354,10 +362,76 @@ def table_pnr(base):
     return pnr.table({name: base["pnr"][name] for name in order if name in base.get("pnr", {})})
 
 
+def row_of(base, title, name, clocks=True):
+    c, frame = flat(base, name)["counts"], base["frames"].get(name)
+    return [title, c["lut"], c["ff"], num(c["ram36_equivalent"]), c["dsp"],
+            mega(frame["clocks"]) if frame and clocks else ""]
+
+
+COUNTS = ["LUT", "FF", "RAMB36", "DSP"]
+
+
+def table_decisions(base):
+    """docs/architecture.md: what was decided for, beside what was not."""
+    def times(number, title):
+        c = flat(base, "tile")["counts"]
+        return [title, *(num(number * c[k]) for k in ("lut", "ff", "ram36_equivalent", "dsp")), ""]
+    rows = [row_of(base, "bands of 30 rows", "bands"), row_of(base, "tiles of 256 x 130", "tile"),
+            row_of(base, "tiles of 117 x 93", "mbit"),
+            row_of(base, "two lanes", "tile_2"), times(2, "two engines"),
+            row_of(base, "four lanes", "tile_4"), times(4, "four engines"),
+            row_of(base, "four lanes, MNCC divided in products", "tile_4_mul"),
+            row_of(base, "one lane, rectified", "tile_rectified"),
+            row_of(base, "similarity of the bands, rows of 1104 samples", "similarity"),
+            ["the paper's similarity", *PAPER_UNITS["similarity"], ""],
+            row_of(base, "similarity of `tile`, rows of 268 samples", "similarity_tile"),
+            row_of(base, "divider of 16 bits, 13 bits of quotient", "entity_divider"),
+            row_of(base, "divider in products, 13 bits of quotient", "entity_divider_mul"),
+            row_of(base, "MAC, stack and arbiter, smallest buffers", "arbiter")]
+    return markdown(["Virtex-6", *COUNTS, "M clocks"], rows)
+
+
+def table_rectified(base):
+    """docs/psweep.md."""
+    return markdown(["Virtex-6", *COUNTS, "M clocks"],
+                    [row_of(base, "`tile`", "tile"), row_of(base, "`tile`, rectified", "tile_rectified")])
+
+
+def table_division(base):
+    """docs/psweep.md."""
+    return markdown(["Virtex-6", *COUNTS, "M clocks"], [
+        row_of(base, f"`tile`, {lanes}" + (", `G_DIVIDER` = 1" if mul else ""), name + ("_mul" if mul else ""))
+        for name, lanes in (("tile", "one lane"), ("tile_2", "two lanes"), ("tile_4", "four lanes"))
+        for mul in (False, True)])
+
+
+def table_arbiter(base):
+    """docs/arbiter.md: its entities, and what they add up to."""
+    names = ("mac_rx", "async_fifo", "packet_rx", "responder", "packet_tx", "ram_dc", "mac_tx", "counters", "scheduler",
+             "row_buffer", "map_buffer")
+    rows = [row_of(base, name, f"entity_{name}", False)[:5] for name in names]
+    rows += [row_of(base, "**all, flat**, generics as by default", "entity_arbiter", False)[:5],
+             row_of(base, "flat, both buffers of 44-30-13-13", "arbiter_double", False)[:5],
+             row_of(base, "flat, smallest buffers: G_ROW_SLOTS = 2, G_MAP_DEPTH = 704", "arbiter", False)[:5],
+             ["the paper's arbiter (section 5.4, Virtex-5QV, ISE 14.7)", 3000, "", 55, ""]]
+    return markdown(["entity, generics as by default", *COUNTS], rows)
+
+
+def table_chip(base):
+    """README.md: MAC, stack and arbiter beside the paper's."""
+    rows = []
+    for title, name, paper in (("MAC, stack, arbiter, smallest buffers of rows and map", "arbiter", "3K LUT"),
+                               ("the same with both buffers of 44-30-13-13", "arbiter_double", "3K LUT, 55 RAMB36")):
+        c = flat(base, name)["counts"]
+        rows.append([title, f"{c['lut']:,}", f"{c['ff']:,}", num(c["ram36_equivalent"]), paper])
+    return markdown(["Virtex-6, [docs/cost.md](docs/cost.md)", "LUT", "FF", "RAMB36", "paper"], rows)
+
+
 TABLES = {"engines": table_engines, "units": table_units, "cells": table_cells, "families": table_families,
           "levels": table_levels, "five": table_five, "bits": table_bits, "nx": table_nx_rams,
           "targets": table_targets, "pnr": table_pnr, "changes": table_changes,
-          "headline": table_headline}
+          "headline": table_headline, "decisions": table_decisions, "rectified": table_rectified,
+          "division": table_division, "arbiter": table_arbiter, "chip": table_chip}
 
 
 def cost_line(base, entity):

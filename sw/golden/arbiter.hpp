@@ -410,6 +410,7 @@ class Arbiter {
           if (stage_ == Stage::kDrain) {
             failed_ = true;
             failed_tile_ = run_tile_;
+            ++counters_[net::kTilesFailed];
             stage_ = Stage::kIdle;
           } else {
             compute();

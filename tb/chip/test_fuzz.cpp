@@ -8,7 +8,8 @@
 //             answered, sessions that move to another host. Then damage: cut, lengthened, bits
 //             flipped with and without a right FCS, lengths and offsets overwritten, odd nibbles, rx_er, other
 //             addresses
-//   Number  : PSWEEP_FUZZ_FRAMES (2000) per configuration; PSWEEP_FUZZ_PROGRESS=1: a line on stderr now and then
+//   Number  : PSWEEP_FUZZ_FRAMES (2000) per configuration; PSWEEP_FUZZ_PROGRESS=1: a line on stderr now and then;
+//             PSWEEP_FUZZ_CHIP: that configuration alone
 //   Compared: after every frame all replies, their order and number, every byte of every map; every 500 frames a whole
 //             good pair of three tiles goes through ('right afterwards') and the counters agree
 //   Buffers : map cells come from the row buffer and through the map buffer; a byte written to a wrong place of either
@@ -973,6 +974,7 @@ class Fuzz {
 
 TEST_CASE("chip: random and mutated frames against the models") {
   const std::string name = GENERATE("tiny", "tiny_min", "odd");
+  if (const char* only = std::getenv("PSWEEP_FUZZ_CHIP"); only != nullptr && name != only) return;
   const int64_t frames = number_from("PSWEEP_FUZZ_FRAMES", 2000);
   CAPTURE(name, test_seed());
   Fuzz fuzz(chip_named(name));

@@ -60,16 +60,16 @@ sub edit {
         or die "inject.pl: register $1 of control was not understood\n";
     }
   }
-  if ($entity =~ /^ram_/ && $body =~ /reg (?:\[(\d+):0\] )?memory\[(\d+):0\]/) {
-    my ($width, $words) = (($1 // 0) + 1, $2 + 1);
+  if ($entity =~ /^ram_/ && $body =~ /reg (?:\[(\d+):0\] )?((?:\w+_)?memory)\[(\d+):0\]/) {
+    my ($width, $memory, $words) = (($1 // 0) + 1, $2, $3 + 1);
     my $number = site($entity, "${where}memory", $width, $words);
     my $word = 'psweep.flip_word[' . (length(sprintf '%b', $words - 1) - 1) . ':0]';
-    $body =~ s{always \@\(posedge clk\)\n    if \(we\)\n      memory\[waddr\] <= wdata;}
+    $body =~ s{always \@\(posedge clk\)\n    if \(we\)\n      $memory\[waddr\] <= wdata;}
               {always \@(posedge clk) begin
     if (we)
-      memory[waddr] <= wdata;
+      ${memory}[waddr] <= wdata;
     if (psweep.flip_site == $number)
-      memory[$word] <= memory[$word] ^ @{[mask($width)]};
+      ${memory}[$word] <= ${memory}[$word] ^ @{[mask($width)]};
   end} or die "inject.pl: the write port of $module was not understood\n";
   }
   return $body;

@@ -5,12 +5,14 @@
 //   - it takes as many pixels as its window has, sweeps its samples in order, G_LANES planes at once, and rows start
 //     8 clocks apart or more; the map is unloaded when what was swept has had time to reach it
 //   - every start that finds the engine idle ends in one tile done or one tile dropped, never in both
-//   - the state is one of six, so the error 'upset' never comes
+//   - the state is one of six, so the error 'upset' comes behind a word with wrong parity in a sweep and else never; it
+//     drops the tile
 // `LANES and `LATENCY are the entity's generics. Sizes are followed here from the writes on s_cfg alone. tile_done and
 // tile_drop are brought out by scripts/formal.sh.
-// Assumed of updating: the last beat of a map comes once, while unloading, and until then a beat is there or follows.
+// Assumed of updating: the last beat of a map comes once, while unloading but not in its first clock, and until then a
+// beat is there or follows.
 module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, map_valid, map_last,
-             input [`LANES - 1:0] window_error, input [47:0] s_cfg_tdata);
+             input [`LANES - 1:0] window_error, word_error, input [47:0] s_cfg_tdata);
   wire s_pix_tready, load_valid, load_row_end, m_valid, m_row_first, m_plane_first, m_plane_last;
   wire map_unload, map_start, map_abort, tile_done, tile_drop;
   wire [2:0] load_col, state;
@@ -23,7 +25,7 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
               .m_valid(m_valid), .m_row_first(m_row_first), .m_plane_first(m_plane_first),
               .m_plane_last(m_plane_last), .m_plane(m_plane), .m_lanes(m_lanes),
               .map_start(map_start), .map_unload(map_unload), .map_abort(map_abort),
-              .map_more(map_more), .map_valid(map_valid), .map_last(map_last), .window_error(window_error),
+              .map_more(map_more), .map_valid(map_valid), .map_last(map_last), .window_error(window_error), .word_error(word_error),
               .state(state), .errors(errors), .tile_done(tile_done), .tile_drop(tile_drop));
 
   localparam IDLE = 0, LOAD = 1, SWEEP = 2, FLUSH = 3, UNLOAD = 4, DRAIN = 5;
@@ -35,7 +37,8 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   wire [31:0] value = cfg_word[31:0];
   wire write = cfg && state == IDLE;
   wire command = cfg && address == 0;
-  wire abort = command && value[1];
+  reg upset = 0, upset_seen = 0;                    // a word with wrong parity a clock ago; any
+  wire abort = upset || command && value[1];
   wire start = command && value[0] && !value[1] && state == IDLE;
   reg [4:0] known = 0;
   reg [2:0] tile_cols = 1, tile_rows = 1, win_cols = 1, win_rows = 1, planes = 1;
@@ -51,6 +54,7 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   reg [1:0] set = 0;
   reg sample = 0, sample_row = 0, sample_plane = 0, sample_last = 0;
   reg [1:0] sample_set = 0;
+  reg was_unload = 0;
   reg [3:0] quiet = 0;                              // clocks since the last sample
   wire [3:0] row_clocks = tile_cols + 2 < 8 ? 8 : tile_cols + 2;
   wire last_pixel = col == win_cols - 1 && row == win_rows - 1;
@@ -61,6 +65,9 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   always @($global_clock) if (clk) begin
     cfg <= s_cfg_tvalid && !rst;
     cfg_word <= s_cfg_tdata;
+    upset <= !rst && !abort && (state == SWEEP || state == FLUSH) && word_error != 0;
+    upset_seen <= !rst && (upset || upset_seen);
+    was_unload <= state == UNLOAD;
     if (rst) begin
       begun <= 1;
       known <= 0;
@@ -112,10 +119,11 @@ module proof(input clk, rst, s_cfg_tvalid, s_pix_tvalid, s_pix_tlast, map_more, 
   end
 
   always @* begin
-    assume (!map_last || state == UNLOAD && map_valid && !map_more);
+    assume (!map_last || state == UNLOAD && was_unload && map_valid && !map_more);
     assume (state != UNLOAD || map_more || map_valid);
     if (begun) begin
-      assert (state <= DRAIN && !errors[7]);
+      assert (state <= DRAIN && (!errors[7] || upset_seen));
+      if (upset) assert (tile_drop);
       assert (s_pix_tready == (state == LOAD || state == DRAIN));
       assert (open == (state == LOAD || state == SWEEP || state == FLUSH || state == UNLOAD));
       assert (!(tile_done && tile_drop) && (!(tile_done || tile_drop) || open || start));

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // address_generator: positions, fractions, tests and bank rows of every sample equal the model, rows of every length
-// back to back, planes back to back, positions that wrap, steps from 0 to the largest; latency as in the header.
+// back to back, planes back to back, positions that wrap, steps from 0 to the largest; latency as in the header. A word
+// of table or offsets that is not what was written is told, whichever bit it is, by a row that reads it and by no
+// other.
+#include <algorithm>
+#include <array>
+#include <bitset>
 #include <cmath>
 #include <deque>
 #include <random>
@@ -40,6 +45,7 @@ struct Bench : Agent {
   };
   std::deque<Expected> expected;
   uint64_t surplus = 0, on_row = 0, between_rows = 0;
+  std::vector<uint64_t> word_errors;  // clocks of them
 
   explicit Bench(const golden::Config& c) : config(c) {
     dut.table_we = 0;
@@ -54,6 +60,7 @@ struct Bench : Agent {
     dut.s_plane_last = 0;
   }
   void sample() override {
+    if (dut.m_word_error) word_errors.push_back(sim.cycle());
     if (!dut.m_valid) {
       if (dut.m_row_first || dut.m_window_error) ++surplus;
       return;
@@ -95,6 +102,11 @@ struct Bench : Agent {
     }
   }
 
+  // The bit of `wrong`, 0 to 31 of the word or 32 for its parity, is not what it should be.
+  void write_data(uint32_t word, int wrong = -1) {
+    dut.cfg_parity = (std::bitset<32>(word).count() & 1) ^ (wrong == 32);
+    dut.cfg_data = word ^ (wrong >= 0 && wrong < 32 ? uint32_t{1} << wrong : 0);
+  }
   void load(const golden::TileJob& t, const std::vector<golden::PlaneEntry>& table) {
     dut.table_we = 1;
     for (size_t k = 0; k < table.size(); ++k) {
@@ -109,7 +121,7 @@ struct Bench : Agent {
                                  p.dy_right};
       for (size_t f = 0; f < 8; ++f) {
         dut.table_addr = static_cast<std::remove_reference_t<decltype(dut.table_addr)>>(8 * k + f);
-        dut.cfg_data = words[f];
+        write_data(words[f]);
         sim.tick();
       }
     }
@@ -118,7 +130,7 @@ struct Bench : Agent {
     const int32_t offsets[4] = {t.tx_left, t.ty_left, t.tx_right, t.ty_right};
     for (unsigned i = 0; i < 4; ++i) {
       dut.offset_addr = static_cast<CData>(i);
-      dut.cfg_data = static_cast<uint32_t>(offsets[i]);
+      write_data(static_cast<uint32_t>(offsets[i]));
       sim.tick();
     }
     dut.offset_we = 0;
@@ -187,6 +199,7 @@ struct Bench : Agent {
     }
     CHECK(expected.empty());
     CHECK(surplus == 0);
+    CHECK(word_errors.empty());
   }
 };
 
@@ -319,4 +332,95 @@ TEST_CASE("address_generator: reset in mid-row, then a good plane") {
     bench.sweep(t, table, 12, 5, 0);
   }
   bench.check();
+}
+
+TEST_CASE("address_generator: a bit of a table or offset word that is wrong is told by the rows that read it") {
+  Bench<Vaddress_generator_mid> bench(mid_config());
+  golden::TileJob t;
+  t.win_cols = 40, t.win_rows = 30;
+  t.left = t.right = {0, 38, 0, 28};
+  std::mt19937 random(test_seed());
+  auto any = [&] { return static_cast<int32_t>(static_cast<uint32_t>(random())); };
+  t.tx_left = any(), t.ty_left = any(), t.tx_right = any(), t.ty_right = any();
+  std::vector<golden::PlaneEntry> table(3);
+  for (auto& p : table) {
+    p.x0_left = any(), p.y0_left = any(), p.x0_right = any(), p.y0_right = any();
+    for (uint32_t* step : {&p.dx_left, &p.dy_left, &p.dx_right, &p.dy_right})
+      *step = static_cast<uint32_t>(random()) & ((1u << golden::kStepBits) - 1);
+  }
+  constexpr int kRows = 3, kCols = 5;  // rows shorter than their eight clocks
+  const uint64_t row = golden::kRowMin;
+  bench.load(t, table);
+  auto words_of = [](const golden::PlaneEntry& p) {
+    return std::array<uint32_t, 8>{static_cast<uint32_t>(p.x0_left),
+                                   static_cast<uint32_t>(p.y0_left),
+                                   static_cast<uint32_t>(p.x0_right),
+                                   static_cast<uint32_t>(p.y0_right),
+                                   p.dx_left,
+                                   p.dy_left,
+                                   p.dx_right,
+                                   p.dy_right};
+  };
+  auto run = [&] {
+    bench.expected.clear();
+    bench.word_errors.clear();
+    const uint64_t begun = bench.sim.cycle();
+    bench.sweep(t, table, kCols, kRows, 0);
+    return begun;
+  };
+  run();
+  CHECK(bench.word_errors.empty());
+  // Which rows of a plane read a word: y0 the first one, dy the others, the rest all. Told within the eight clocks.
+  auto in_row = [&](uint64_t clock, uint64_t begun) { return clock > begun && clock <= begun + row; };
+  for (int field = 0; field < 8; ++field) {
+    for (int bit = 0; bit <= 32; ++bit) {
+      INFO("field " << field << " bit " << bit);
+      const uint32_t word = words_of(table[1])[static_cast<size_t>(field)];
+      bench.dut.table_we = 1;
+      bench.dut.table_addr = static_cast<std::remove_reference_t<decltype(bench.dut.table_addr)>>(8 + field);
+      bench.write_data(word, bit);
+      bench.sim.tick();
+      bench.dut.table_we = 0;
+      const uint64_t begun = run() + kRows * row;  // of plane 1
+      const bool first = field != 5 && field != 7, others = field != 1 && field != 3;
+      std::vector<uint64_t> rows;
+      for (uint64_t j = 0; j < kRows; ++j)
+        if (j == 0 ? first : others) rows.push_back(begun + j * row);
+      REQUIRE(bench.word_errors.size() == rows.size());
+      for (size_t k = 0; k < rows.size(); ++k) CHECK(in_row(bench.word_errors[k], rows[k]));
+      bench.dut.table_we = 1;
+      bench.write_data(word);
+      bench.sim.tick();
+      bench.dut.table_we = 0;
+    }
+  }
+  // y offsets are read by the first row of each plane, x offsets by every row.
+  const int32_t offsets[4] = {t.tx_left, t.ty_left, t.tx_right, t.ty_right};
+  for (unsigned which = 0; which < 4; ++which) {
+    for (int bit = 0; bit <= 32; ++bit) {
+      INFO("offset " << which << " bit " << bit);
+      bench.dut.offset_we = 1;
+      bench.dut.offset_addr = static_cast<CData>(which);
+      bench.write_data(static_cast<uint32_t>(offsets[which]), bit);
+      bench.sim.tick();
+      bench.dut.offset_we = 0;
+      const uint64_t begun = run();
+      std::vector<uint64_t> rows;
+      for (uint64_t j = 0; j < table.size() * kRows; ++j)
+        if (which % 2 == 0 || j % kRows == 0) rows.push_back(begun + j * row);
+      for (const uint64_t at : rows)
+        CHECK(std::any_of(bench.word_errors.begin(), bench.word_errors.end(),
+                          [&](uint64_t clock) { return in_row(clock, at); }));
+      bench.dut.offset_we = 1;
+      bench.write_data(static_cast<uint32_t>(offsets[which]));
+      bench.sim.tick();
+      bench.dut.offset_we = 0;
+    }
+  }
+  run();
+  CHECK(bench.word_errors.empty());
+  // What was never written is not read by a row, so it is no error: planes 3 and 4. Nor is anything told in a reset.
+  bench.sim.reset(3);
+  bench.sim.run(20);
+  CHECK(bench.word_errors.empty());
 }

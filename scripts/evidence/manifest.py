@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kinds of evidence: how each is made, what it depends on, where its output lies.
+
+Order: the most telling first; `make evidence` runs what is stale in this order. What a kind depends on are globs
+(sources.expand): '@engine', '@chip' is the RTL. Its tables stand in the pages between `<!-- evidence: NAME -->` and
+`<!-- /evidence -->`, NAME being the kind, or the kind, a dot and more (tables.py); the older markers `<!-- cost: X -->`
+belong to 'cost' and 'pnr' and are filled by scripts/cost/report.py."""
+from dataclasses import dataclass
+
+BUILD = ("CMakeLists.txt", "scripts/cmake/**")
+MODEL = ("sw/golden/**", "tb/support/**", "tb/configs/**")
+PLAN = ("sw/plan/**", "sw/golden/**", "sw/scene/**")
+CHIP = ("@chip", *BUILD, *MODEL, "tb/chip/**", "!tb/chip/test_*", "!tb/chip/link_speed.cpp", "sw/net/**")
+ENGINE = ("@engine", *BUILD, *MODEL, "tb/rtl/**", "tb/engine/engine_bench.hpp", "tb/engine/stimulus.hpp",
+          "tb/engine/configurations.hpp")
+REPLAY = ("tb/replay/**", "!tb/replay/record_*")
+
+
+@dataclass(frozen=True)
+class Kind:
+    name: str
+    command: tuple[str, ...]  # of make; each is run
+    depends: tuple[str, ...]
+    minutes: float  # about, on two idle cores
+    output: str = ""  # file that is read; '': what the commands print
+    # Valid although the command said that something is wrong: the table says so.
+    speaks_for_itself: bool = False
+    takes_a_copy: bool = False  # of the sources as it begins, so that edits during the run do no harm
+    goes_on: str = ""  # how an interrupted run goes on; '': from the start
+    needs: str = ""  # beyond the packages that `make` installs
+
+
+KINDS: tuple[Kind, ...] = (
+    Kind("mutants", ("mutants",),
+         ("@chip", *BUILD, *MODEL, "tb/units/**", "tb/engine/**", "tb/rtl/**", "tb/chip/**", "!tb/chip/link_speed.cpp",
+          "!tb/chip/test_goodput.cpp", "!tb/chip/test_link*", "tb/replay/**", "tb/soak/**", "sw/net/**", "sw/plan/**",
+          "sw/scene/**", "scripts/mutants/**", "scripts/mutants_equivalent.txt"),
+         60, "build/evidence/mutants.json", speaks_for_itself=True, takes_a_copy=True,
+         goes_on="mutant by mutant, also after edits: build/mutants/results.jsonl"),
+    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/flips/**", "scripts/flips_chip.py"), 15, "build/flips_chip.txt"),
+    Kind("flips", ("flips",), (*ENGINE, "tb/flips/flips.cpp", "tb/flips/inject.pl", "scripts/flips.sh"), 2,
+         "build/flips.txt"),
+    Kind("soak", ("soak",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/soak.sh"), 4),
+    Kind("formal", ("formal",),
+         ("@chip", "tb/formal/**", "scripts/formal.sh"), 4),
+    Kind("rules", ("rules",), (*ENGINE, *REPLAY, "tb/replay/record_engine.cpp", "scripts/rules.sh"), 2),
+    Kind("cost", ("cost-update",),
+         ("@chip", "tb/configs/**", "tb/chip/configs/**", "sw/app/shape_table.cpp", "sw/app/link_table.cpp", *PLAN,
+          "scripts/cost/**", "!scripts/cost/baseline.json", "!scripts/cost/pnr.py", "!scripts/cost/report.py"),
+         20, "scripts/cost/baseline.json", goes_on="count by count: build/cost/cache"),
+    Kind("gates", ("sim-gates",),
+         (*ENGINE, *REPLAY, "tb/replay/record_engine.cpp", "tb/gates/**", "scripts/sim_gates.sh", "scripts/cost/**",
+          "!scripts/cost/baseline.json", "!scripts/cost/report.py", "!scripts/cost/points.py"), 6),
+    Kind("link-speed", ("link-speed",),
+         (*CHIP, "tb/chip/link_speed.cpp", "tb/chip/test_goodput.cpp", "sw/fast/**", *PLAN, "scripts/link_speed.sh"),
+         8),
+    Kind("sim-ghdl", ("sim-ghdl",), (*ENGINE, *REPLAY, "tb/replay/record_engine.cpp", "scripts/sim_ghdl.sh"), 6),
+    Kind("link-table", ("link-table",), ("sw/app/link_table.cpp", *PLAN, "sw/net/**"), 2),
+    Kind("shape-table", ("shape-table",), ("sw/app/shape_table.cpp", *PLAN, "scripts/shape_table.sh"), 1),
+    Kind("sweep", ("sweep",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/sweep.sh", "scripts/make_config.cmake"), 6,
+         "build/sweep/results.txt"),
+    Kind("coverage-lines", ("coverage-lines",),
+         ("@chip", *BUILD, *MODEL, "tb/replay/**", "tb/rtl/**", "tb/chip/**", "!tb/chip/test_*", "sw/net/**",
+          "scripts/coverage.sh", "scripts/coverage.pl", "scripts/coverage_holes.txt"),
+         20, "build/coverage/lines.txt", needs="GHDL 4 or newer (Debian 13)"),
+    Kind("coverage-toggles", ("coverage-toggles",),
+         ("@chip", *BUILD, *MODEL, "tb/units/**", "tb/engine/**", "tb/rtl/**", "tb/chip/**", "sw/net/**",
+          "scripts/coverage.sh", "scripts/coverage.pl"),
+         35, "build/coverage/toggles.txt"),
+    Kind("accuracy", ("accuracy",),
+         ("sw/eval/**", "sw/scene/**", "sw/reference/**", "sw/golden/**", "sw/fast/**", "sw/core/**"), 30),
+    Kind("pnr", ("pnr-update",), ("@engine", "tb/configs/tile.json", "scripts/cost/**", "!scripts/cost/baseline.json",
+                                  "!scripts/cost/report.py"), 60, "scripts/cost/baseline.json"),
+    Kind("fresh-machine", ("fresh-machine SUITE=bookworm", "fresh-machine SUITE=trixie"),
+         ("@chip", "CMakeLists.txt", "Makefile", "tb/**", "sw/**", "scripts/setup.sh", "scripts/packages.txt",
+          "scripts/sim.sh", "scripts/demo.sh", "scripts/fresh_machine.sh"), 50, needs="root and debootstrap"),
+)
+BY_NAME = {kind.name: kind for kind in KINDS}
+
+
+def chosen(names: list[str]) -> list[Kind]:
+    """Kinds by name; 'coverage' means all that begin with 'coverage-' (if there is none of that very name)."""
+    out: list[Kind] = []
+    for name in names:
+        found = [BY_NAME[name]] if name in BY_NAME else [k for k in KINDS if k.name.startswith(f"{name}-")]
+        if not found:
+            raise ValueError(f"no kind of evidence '{name}': " + ", ".join(BY_NAME))
+        out += [kind for kind in found if kind not in out]
+    return [kind for kind in KINDS if kind in out]
