@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- counters: G_COUNT event counters of 32 bits in one RAM with one adder; they wrap.
+-- counters: G_COUNT event counters of 32 bits in two RAMs with one adder; they wrap.
 --   Events   : a pulse sets a pending bit. A scanner adds them to the counters, one every 4 clocks; four bits at a time
 --              move into a shift register before, which takes less logic than to pick and clear single ones. So each
 --              event may pulse once in 4*G_COUNT clocks; faster pulses of one event count as one. Counted after at
@@ -7,8 +7,8 @@
 --   Read     : r_valid = '1': r_data is the counter r_index, read after r_index became what it is; both hold until
 --              r_index changes. Up to 7 clocks later. A number from G_COUNT on reads something without meaning
 --   Phases   : words are kept in halves, for an adder of 16 bits, each half in a RAM of its own: 0 read the scanned
---              counter's lower half, 1 write it back, read the upper one, 2 write it back, 3 read both halves of r_index,
---              0 take them. A word that is read while it is written is not used
+--              counter's lower half, 1 write it back, read the upper one, 2 write it back, 3 read both halves of
+--              r_index, 0 take them. A word that is read while it is written is not used
 --   Reset    : rst only. A first scan of 4*G_COUNT clocks writes zeros; events until then may be lost, r_valid is '0'
 --   Golden   : sw/golden/counters.hpp
 library ieee;
@@ -67,11 +67,11 @@ begin
            & " outside 1..64"
     severity failure;
 
-  four     <= scan(C_INDEX_W - 1 downto 2);
-  move     <= to_bit(phase = 0) and to_bit(scan(1 downto 0) = 0);
+  four       <= scan(C_INDEX_W - 1 downto 2);
+  move       <= to_bit(phase = 0) and to_bit(scan(1 downto 0) = 0);
   write_low  <= to_bit(phase = 1);
   write_high <= to_bit(phase = 2);
-  raddr    <= r_index(C_INDEX_W - 1 downto 0) when phase(1) = '1' else std_logic_vector(scan);
+  raddr      <= r_index(C_INDEX_W - 1 downto 0) when phase(1) = '1' else std_logic_vector(scan);
 
   -- Zeros go in, not out: so they cost nothing.
   add(0)   <= not first and due(0) when phase(0) = '1' else not first and carry;

@@ -117,6 +117,8 @@ struct Bench {
     uint64_t clocks = 0;  // of the engine, if nothing stalls it
     net::Client client(transport, 1.0, test_seed());
     const auto capabilities = client.info();
+    begun = desk.now();
+    transport.flood = flood;
     net::LinkOptions options;
     options.in_flight = in_flight;
     figures = net::run_link_tiles(
@@ -126,6 +128,8 @@ struct Bench {
           if (done.insert(i).second) clocks += golden::engine_clocks(format, in.job) + net::kFirstPairClocks;
           const auto model = golden::run_tile(format, in.job, plan.table, in.left, in.right);
           REQUIRE(cells.size() == model.cells.size());
+          last_map = desk.now();
+          if (static_cast<int>(done.size()) == count) transport.flood.clear();
           for (size_t at = 0; at < cells.size(); ++at)
             board.compare(rtl::pack_cell(format, cells[at]), rtl::pack_cell(format, model.cells[at]),
                           {i, -1, static_cast<int>(at) % in.job.tile_cols, static_cast<int>(at) / in.job.tile_cols},
@@ -153,6 +157,8 @@ struct Bench {
   net::LinkFigures figures;
   net::LinkStatistics statistics;
   int tiles = 0;
+  net::Bytes flood;  // from the first OPEN to the last map: questions without a token are the flood's own kind
+  Time begun = 0, last_map = 0;
   uint64_t cut_frames = 0;  // a frame that a reset may cut off is not whole
 };
 
@@ -177,15 +183,17 @@ net::Header answer(Station& station, const net::Bytes& message) {
 }  // namespace
 
 TEST_CASE("chip: ARP, ping of all sizes, addresses by straps, both speeds") {
-  DeskSettings s = settings_for(chip_named("tiny"));
+  const Chip& chip = chip_named("odd");
+  DeskSettings s = settings_for(chip);
   const bool fast = GENERATE(true, false);
   s.speed_100 = fast;
   s.straps = fast ? 0x00 : 0x9a;
-  Bench b(chip_named("tiny"), s);
+  Bench b(chip, s);
   REQUIRE(b.station.resolve(3));
   CHECK(*b.station.chip_mac() == b.address.mac);
   for (size_t size = 0; size <= 1468; size += fast && (size < 40 || size > 1440) ? 1 : fast ? 29 : 367) {
     INFO("size " << size << (fast ? ", 100" : ", 10") << " Mbit/s");
+    b.desk.run_for(kMillisecond);  // one ping a millisecond is answered
     CHECK(b.station.ping(size, 5 * kMillisecond));
   }
   CHECK(b.desk.link().violations() == 0);
@@ -600,7 +608,8 @@ TEST_CASE("chip: who watches his own tokens cannot close another's session") {
       for (const net::Address& from : {kOther, kHost}) crowd.send(from, request(net::kClose, guess));
     }
   }
-  b.desk.run_until([&] { return b.desk.waiting() == 0; }, b.desk.now() + 100 * kMillisecond);
+  b.desk.run_for(10 * kMicrosecond);
+  REQUIRE(b.desk.run_until([&] { return b.desk.waiting() == 0; }, b.desk.now() + 100 * kMillisecond));
   b.desk.run_for(100 * kMicrosecond);
   crowd.frames.clear();
   CHECK_FALSE(predicted);
@@ -612,7 +621,7 @@ TEST_CASE("chip: who watches his own tokens cannot close another's session") {
   CHECK((crowd.frames.clear(), crowd.header(kHost, request(net::kClose, token)).flags) == net::kOk);
 }
 
-TEST_CASE("chip: a session belongs to who opened it; wrong tokens and strangers learn nothing") {
+TEST_CASE("chip: a session belongs to who opened it, wrong tokens and strangers learn nothing") {
   const Chip& chip = chip_named("tiny");
   Bench b(chip, slow_settings(chip));
   Crowd crowd(b.desk, b.address);
@@ -624,7 +633,7 @@ TEST_CASE("chip: a session belongs to who opened it; wrong tokens and strangers 
     CHECK(net::get32(reply, 4) == net::get32(m, 4));
   };
   net::Address ip = kHost, port = kHost, mac = kHost;
-  ++ip.ip, ++port.port, ++mac.mac[5];
+  ip.ip += 0x100, ++port.port, ++mac.mac[5];
   for (const net::Address& stranger : {ip, port, mac}) refused(stranger, request(net::kStatus, token));
   refused(kHost, request(net::kStatus, token + 1));
   refused(kHost, request(net::kStatus, token ^ 0x80000000));
@@ -903,7 +912,8 @@ TEST_CASE("chip: a transmitter that stands still or finds no gap does not hold t
   const uint32_t next = crowd.open(kHost);
   CHECK(next != token);
   CHECK(crowd.flags(kHost, next) & net::kFlagSession);
-  CHECK(crowd.counter(net::kRecovered) >= 1);
+  // Without a clock the chip is stuck; a carrier that does not end the transmitter gives up by itself.
+  CHECK(crowd.counter(carrier ? net::kTxDeferred : net::kRecovered) >= 1);
   CHECK(b.desk.link().violations() == 0);
 }
 
@@ -916,12 +926,11 @@ TEST_CASE("chip: a flood of a stranger's questions costs the session's host litt
   };
   const auto run = [&](const net::Bytes& flood, Time period) {
     Bench b(chip);
-    b.transport.flood = flood;
+    b.flood = flood;
     b.transport.flood_period = period;
-    const Time begin = b.desk.now();
     b.run_pair(40, 12);
     CHECK(b.statistics.sessions == 1);
-    return Run{b.desk.now() - begin, b.statistics.lost, b.transport.flooded};
+    return Run{b.last_map - b.begun, b.statistics.lost, b.transport.flooded};
   };
   const net::Address address = strapped(chip.address, 0);
   const net::Bytes small = net::make_udp(kOther, address, request(net::kInfo));
@@ -940,11 +949,11 @@ TEST_CASE("chip: a flood of a stranger's questions costs the session's host litt
   for (const auto& f : floods) {
     const Run r = run(f.frame, f.period);
     const double slower = static_cast<double>(r.time) / static_cast<double>(quiet.time);
-    std::printf("%s, %s: %llu in %.2f ms, run %.2f times as long, %llu packets lost (quiet %llu)\n", name, f.name,
-                static_cast<unsigned long long>(r.flooded), static_cast<double>(r.time) / kMillisecond, slower,
-                static_cast<unsigned long long>(r.lost), static_cast<unsigned long long>(quiet.lost));
+    std::printf("%s, %s: %llu in %.2f ms, first OPEN to last map %.2f times as long, %llu packets lost (quiet %llu)\n",
+                name, f.name, static_cast<unsigned long long>(r.flooded), static_cast<double>(r.time) / kMillisecond,
+                slower, static_cast<unsigned long long>(r.lost), static_cast<unsigned long long>(quiet.lost));
     INFO(name << ": " << f.name);
-    CHECK(r.flooded > 100);
+    CHECK(r.flooded > 50);
     CHECK(slower < f.most);
   }
 }

@@ -89,7 +89,7 @@ int64_t number_from(const char* variable, int64_t otherwise) {
 constexpr const char* kClasses[] = {
     "frame: no delimiter", "frame: rx_fcs", "frame: rx_align", "frame: rx_short", "frame: rx_long", "frame: rx_error",
     "frame: rx_filtered", "frame: rx_other", "frame: ip_header", "frame: ip_fragment", "frame: checksum", "frame: arp",
-    "frame: icmp", "frame: udp", "burst: answered", "burst: no room",
+    "frame: icmp", "frame: udp", "frame: bad_source", "port unreachable", "burst: answered", "burst: no room",
     // Type and code.
     "OPEN ok", "OPEN busy", "OPEN bad message", "CLOSE ok", "CLOSE busy", "INFO ok", "INFO bad message", "COUNTERS ok",
     "COUNTERS bad message", "STATUS ok", "STATUS no session", "STATUS busy", "TABLE ok", "TABLE no session",
@@ -317,11 +317,14 @@ class Fuzz {
     golden::ReceivedFrame frame;
     if (!golden::receive_frame(mangler_->taken, frame)) return seen("frame: no delimiter");
     const golden::PacketRx stack(own_, frame.bytes);
-    const golden::Received r = stack.receive(frame.verdict, true);
-    for (int i = 0; i < 16; ++i) {
+    const golden::Received r = stack.receive(frame.verdict, true, !model_.full_duplex());
+    for (int i = 0; i < golden::kReceiveEvents; ++i) {
       if ((r.events >> i & 1) == 0) continue;
-      model_.count(static_cast<net::Counter>(i));
-      if (i != net::kRxFrames) seen(std::string("frame: ") + net::kCounterNames[i]);
+      const auto counter = i == golden::kEventBadSource  ? net::kBadSource
+                           : i == golden::kEventFragment ? net::kRxFragment
+                                                         : static_cast<net::Counter>(i);
+      model_.count(counter);
+      if (i != net::kRxFrames) seen(std::string("frame: ") + net::kCounterNames[counter]);
     }
     if (!r.message) return;
     const Bytes& f = frame.bytes;
@@ -334,6 +337,12 @@ class Fuzz {
     using Bucket = golden::Arbiter::Bucket;
     if (r.message->kind != golden::MessageKind::kUdp && !model_.allow(arp ? Bucket::kArp : Bucket::kOther)) {
       seen("limited");
+    } else if (r.message->kind == golden::MessageKind::kClosed) {
+      Bytes offender(4, 0);
+      offender.insert(offender.end(), f.begin() + 14, f.begin() + 42);
+      expected_.push_back({golden::transmit(r.message->kind, own_, peer, offender)});
+      model_.count(net::kUnreachable);
+      seen("port unreachable");
     } else if (arp) {
       expected_.push_back({golden::transmit(r.message->kind, own_, peer, {})});
     } else if (r.message->kind == golden::MessageKind::kIcmp) {
@@ -794,7 +803,16 @@ class Fuzz {
       f = net::make_icmp_echo(hosts_[below(3)], own_, 8, noise(static_cast<size_t>(4 + below(one_in(8) ? 1460 : 60))));
     } else {
       const Bytes m = kind < 68 ? next_message() : wrong_message();
-      f = net::make_udp(hosts_[static_cast<size_t>(one_in(8) ? below(3) : speaker())], own_, m);
+      net::Address from = hosts_[static_cast<size_t>(one_in(8) ? below(3) : speaker())], to = own_;
+      if (one_in(30)) to.port = static_cast<uint16_t>(one_in(2) ? any() : to.port ^ (1u << below(16)));
+      if (one_in(40)) {
+        const uint32_t bad[] = {0, 0x00ffffff, 0x7f000001, 0xe0000001, 0xefffffff, 0xf0000000, 0xffffffff, own_.ip};
+        const int which = below(10);
+        if (which < 8) from.ip = bad[which];
+        if (which == 8) from.mac = own_.mac;
+        if (which == 9) from.mac[0] |= 1;
+      }
+      f = net::make_udp(from, to, m);
     }
     const int harm = below(48);
     if (harm == 0) return put(f, true);
