@@ -16,8 +16,8 @@
 --   Token     : a shift register that never stops, 8 steps a clock, into which the nonces are mixed; lowest bit 1
 --   Limits    : OPEN, ARP and all else that is not authentic are answered while there is one left in their bucket
 --   Upsets    : the state has a parity bit: no upset of one bit makes another state of it. From a code without a name,
---               and when a frame cannot be sent (about 1 s after the session's time, or without a session), it ends
---               the session and the frame, on both sides, and goes on
+--               and when a frame cannot be sent (1 ms after the session's time; without a session after that time, or
+--               about 1 s if that is less), it ends the session and the frame, on both sides, and goes on
 --   Counters  : events(n) is counter n of the protocol
 --   Reset     : no session, no READ, duplex by pin, full buckets
 --   Golden    : sw/golden/arbiter.hpp

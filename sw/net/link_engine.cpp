@@ -429,6 +429,12 @@ class Pump {
     if (it != downloads_.end() && s.has(kFlagMap) && s.map_tile == number(wanted_)) {
       Download& d = it->second;
       if (s.has(kFlagMapComplete) && !d.checked) {
+        // An upset of the chip's count: cells are missing, or lie at other places than they should.
+        if (s.cells != d.cells.size()) {
+          on_failure(s, wanted_,
+                     ": a map of " + std::to_string(s.cells) + " cells, not " + std::to_string(d.cells.size()));
+          return;
+        }
         d.checked = true;
         figures_.engine_clocks += s.tile_clocks;
         if (d.known == d.there.size()) {

@@ -68,6 +68,7 @@ constexpr int64_t kStep = 64;  // between two states that are kept
 struct Tile {
   Bytes start;
   std::vector<Bytes> rows, map;
+  uint32_t cells = 0;
 };
 struct Work {
   net::ArbiterConfig config;
@@ -436,7 +437,12 @@ struct Host {
         break;
       case Phase::kCheck:
         if (type != net::kStatus) return;
-        if (s->has(net::kFlagMapComplete)) enter(Phase::kRelease, now, wire);
+        if (!s->has(net::kFlagMapComplete)) return;
+        if (s->cells == tile(wanted).cells) {
+          enter(Phase::kRelease, now, wire);
+        } else {
+          failed(now, wire);
+        }
         break;
       case Phase::kRelease:
         if (type != net::kRelease || (h.flags != net::kOk && h.flags != net::kOrder)) return;
@@ -625,6 +631,7 @@ class Campaign {
       tile.rows = net::row_chunks(work_.config, pixels);
       const auto cells = golden::run_tile(c, s->job, s->table, s->left, s->right).cells;
       const auto per = static_cast<size_t>(work_.config.chunk_cells());
+      tile.cells = static_cast<uint32_t>(cells.size());
       for (size_t i = 0; i < cells.size(); ++i) {
         if (i % per == 0) tile.map.emplace_back();
         const uint64_t word = net::pack_wire_cell(c, cells[i]);

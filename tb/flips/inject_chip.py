@@ -106,11 +106,11 @@ class Injector:
                 test, register, start, _, value = both.groups()
                 return (sense + f"    if ({test})\n      {register} <= {start};\n    else\n      "
                         + assignment(register, value, clock) + "\n")
-            read = re.fullmatch(r"    if \(([\w']+)\)\n      (n\d+_data) <= (memory\[\w+\]|n\d+\[\w+\]);\n", rest)
+            read = re.fullmatch(r"    if \(([\w']+)\)\n      (n\d+_data) <= (\w+\[\w+\]);\n", rest)
             if read and not reset:
                 return (sense + f"    if ({read.group(1)})\n      " + assignment(read.group(2), read.group(3), clock)
                         + "\n")
-            if re.fullmatch(r"    if \(\w+\)\n      (memory|n\d+)\[\w+\] <= \w+;\n", rest) and not reset:
+            if re.fullmatch(r"    if \(\w+\)\n      \w+\[\w+\] <= \w+;\n", rest) and not reset:
                 return sense + rest
             die(f"this of {module} was not understood:\n{match.group(0)}")
 

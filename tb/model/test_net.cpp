@@ -417,6 +417,20 @@ TEST_CASE("a tile that fails is sent again in a new session, and counted", "[net
     CHECK(t.statistics.sessions == static_cast<uint64_t>(1 + failures));
     CHECK(t.figures.tiles_unconfirmed == 0);
   }
+  SECTION("a map that ends with another number of cells than the tile has") {
+    between.down = [&](Bytes& m) {
+      const uint32_t session = chip.counter(net::kSessions);
+      const int type = m[3] & 0x7f;
+      const bool status = type >= net::kStatus && type <= net::kRelease && m.size() > net::kHeaderBytes + 20;
+      if (status && session <= static_cast<uint32_t>(failures) &&
+          (net::get16(m, net::kHeaderBytes + 2) & net::kFlagMapComplete) != 0)
+        net::put32(m, net::kHeaderBytes + 16, net::get32(m, net::kHeaderBytes + 16) ^ 8);
+      return true;
+    };
+    const Transfer t = transfer_between(between, scene);
+    check_map(scene, t);
+    CHECK(t.figures.tiles_repeated == static_cast<uint64_t>(failures));
+  }
   SECTION("samples outside the window that do not come again") {
     int left = failures;
     chip.set_compute([&](const golden::TileJob& t, const std::vector<golden::PlaneEntry>& table,
