@@ -62,7 +62,7 @@ flips: setup ## Upsets of single bits in control, plane table, map: nothing hang
 	@scripts/flips.sh $(if $(ALL),--all) $(if $(SEED),--seed $(SEED))
 
 .PHONY: flips-chip
-flips-chip: setup ## 20,000 upsets of the whole chip while tiles run over the link: nothing hangs (10 minutes)   COUNT=n SEED=n
+flips-chip: setup ## 20,000 upsets of the whole chip, tiles on its link: nothing hangs (10 minutes)   COUNT=n SEED=n
 	@scripts/build.sh chip_flips
 	@scripts/flips_chip.py $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED))
 
