@@ -129,7 +129,10 @@ class HostileTransport : public net::Transport {
   // An answer to one of the latest questions.
   std::optional<Bytes> forged() {
     if (malice_ == Malice::kDamaged || asked_.empty()) return std::nullopt;
-    const Bytes& question = asked_[asked_.size() - 1 - static_cast<size_t>(below(static_cast<int>(asked_.size())))];
+    // CLOSE comes once a job, and nothing behind it: it is not left to chance.
+    const bool last = asked_.back()[3] == net::kClose;
+    const Bytes& question =
+        asked_[last ? asked_.size() - 1 : static_cast<size_t>(below(static_cast<int>(asked_.size())))];
     const auto h = net::decode(question);
     if (!h) return std::nullopt;
     Bytes m(question.begin(), question.begin() + net::kHeaderBytes);

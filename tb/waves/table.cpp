@@ -160,13 +160,14 @@ std::vector<TableRow> compare_cell(const Capture& c, const tb::Stimulus& stimulu
   rows.push_back(samples);
   // As the entity sees them: left less half the range, right mirrored, so that the covariance changes its sign.
   const int64_t n = samples.golden;
-  add("sum of l'", "s8_l", 8, sums.l, {-1, false, true, true});
+  // The -1 of the last line comes with the left sum: S^2 - 1 = (S + 1) (S - 1).
+  add("sum of l' - 1", "s8_l", 8, sums.l - 1, {-1, false, true, true});
   add("sum of r'", "s8_r", 8, sums.r, {-1, false, true, true});
   add("-n sum of l' r'", "s10_x", 10, -n * sums.x, {-1, false, true, true});
   // Modulo 2^bits, bits those of n^2 (var + var): the entity needs no more of it.
   int bits = 2 * config.sample_bits() - 1;
   while ((int64_t{1} << bits) < (n * n << (2 * config.sample_bits() - 1))) ++bits;
-  add("-n sum of l'^2 + r'^2, - 1", "s10_y", 10, (-n * sums.y - 1) & ((int64_t{1} << bits) - 1), {});
+  add("-n sum of l'^2 + r'^2", "s10_y", 10, (-n * sums.y) & ((int64_t{1} << bits) - 1), {});
   add("n^2 cov", "s12_half", 12, -sums.covariance(n), {-1, false, true, true});
   add("-n^2 (var + var) - 1", "s12_nden", 12, -sums.variances(n) - 1, {-1, false, true, true});
   const golden::Similarity s = similarity_of(c, trace);
