@@ -23,10 +23,11 @@ architecture rtl of reset_filter is
   signal pins  : std_logic_vector(0 downto 0);
   signal high  : std_logic_vector(0 downto 0);
   -- 0: works; to 15: low for so long; 16: reset; to 31: high for so long. The start value is for simulators with
-  -- unknown values, which would keep one for ever; a flip-flop is one or the other.
+  -- unknown values, which would keep one for ever; a flip-flop is one or the other. It is the reset, so that no rule
+  -- about registers speaks before they have been reset.
   signal count : unsigned(4 downto 0)
   -- synthesis translate_off
-    := (others => '0')
+    := (4 => '1', others => '0')
   -- synthesis translate_on
     ;
 
