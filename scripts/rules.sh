@@ -65,7 +65,7 @@ try() {
 
 try stream_fifo "s/m_valid = '1' and m_tready = '1'/m_valid = '1'/" 'stream_fifo: a beat that waited at m_*'
 try updating 's/G_DEPTH_LOG2 => 4/G_DEPTH_LOG2 => 2/' 'updating: a cell that leaves finds no place'
-try address_generator "s/s_plane_first = '0' else/s_plane_first = '1' else/" 'address_generator: a position is unknown'
+try address_generator "s/and s_plane_first = '0'$/and s_plane_first = '1'/" 'address_generator: a position is unknown'
 try control "s/if is_sweep = '1' and at_last = '1' then\$/if is_sweep = '1' then/" \
   'address_generator: the plane changed within a row'
 try control 's/to_unsigned\(C_ROW_MIN - 1, C_COL_W\)/to_unsigned(C_ROW_MIN - 2, C_COL_W)/' \

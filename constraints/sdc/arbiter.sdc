@@ -40,5 +40,5 @@ set_input_delay -clock clk 0.0 [get_ports {
   tiles_done[*] tiles_dropped[*] window_errors[*] tile_clocks[*]
 }]
 set_output_delay -clock clk 0.0 [get_ports {
-  session m_cfg_tvalid m_cfg_tdata[*] m_pix_tvalid m_pix_tdata[*] m_pix_tlast s_map_tready
+  session clock_missing[*] m_cfg_tvalid m_cfg_tdata[*] m_pix_tvalid m_pix_tdata[*] m_pix_tlast s_map_tready
 }]
