@@ -12,6 +12,7 @@ Table and sites in build/flips_chip.txt. Exit code 1 if the chip hangs, or if no
 """
 import argparse
 import collections
+import concurrent.futures
 import os
 import pathlib
 import subprocess
@@ -25,20 +26,20 @@ VERDICTS = ("masked", "repeated", "session", "error", "silent", "hang")
 
 def run(options):
     """Lines of all upsets, in no order, and the line about the run without one."""
-    parts = [subprocess.Popen([str(PROGRAM), "--lines", "--count", str(options.count), "--seed", str(options.seed),
+    def part(k):
+        done = subprocess.run([str(PROGRAM), "--lines", "--count", str(options.count), "--seed", str(options.seed),
                                "--part", f"{k}/{options.jobs}"],
                               stdout=subprocess.PIPE, stderr=None if k == 1 else subprocess.DEVNULL, text=True)
-             for k in range(1, options.jobs + 1)]
+        if done.returncode != 0:
+            raise RuntimeError(f"{PROGRAM.name} --part {k}/{options.jobs} ended with {done.returncode}:\n"
+                               + done.stdout[-2000:])
+        return done.stdout.splitlines()
+
     lines, about = [], ""
-    # One after the other: what the others write meanwhile fits into their pipes, or makes them wait.
-    for part in parts:
-        for line in part.stdout:
-            if line.startswith("upset\t"):
-                lines.append(line.rstrip("\n").split("\t")[1:])
-            else:
-                about = line.strip()
-        if part.wait() not in (0, 1):
-            sys.exit(f"flips_chip.py: {PROGRAM.name} failed")
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        for text in pool.map(part, range(1, options.jobs + 1)):
+            lines += [line.split("\t")[1:] for line in text if line.startswith("upset\t")]
+            about = next((line for line in text if not line.startswith("upset\t")), about)
     return lines, about
 
 
@@ -89,7 +90,10 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=int(os.environ.get("JOBS") or os.cpu_count() or 1))
     options = parser.parse_args()
-    lines, about = run(options)
+    try:
+        lines, about = run(options)
+    except RuntimeError as problem:
+        sys.exit(f"flips_chip.py: {problem}")
     groups, total, sites, again = tables(lines)
     report = [about] + text_table(groups, total)
     for verdict, places in sites.items():
