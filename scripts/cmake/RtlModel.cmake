@@ -117,7 +117,8 @@ function(rtl_model name)
       ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
       SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES} -D EDIT=${A_EDIT}
       -D NOTES=${dir}/${name}.inc -P ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
-    DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake ${A_EDIT}
+    DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake ${PSWEEP_RTL_MODEL_DIR}/EditedSources.cmake
+            ${A_EDIT}
     COMMENT "GHDL ${name}"
     VERBATIM)
   set(waivers ${PSWEEP_RTL_MODEL_DIR}/ghdl_netlist.vlt)

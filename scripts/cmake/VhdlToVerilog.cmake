@@ -7,6 +7,7 @@
 # template that synthesis tools see. Such files are copied into DIR.
 # Shows GHDL's messages if it fails or warns; its notes ("found RAM ..") are left out, as is the warning that attributes
 # for the FPGA tools do not reach the Verilog.
+include(${CMAKE_CURRENT_LIST_DIR}/EditedSources.cmake)
 string(REPLACE "|" ";" SOURCES "${SOURCES}")
 string(REPLACE "|" ";" GENERICS "${GENERICS}")
 file(MAKE_DIRECTORY ${DIR})
@@ -25,18 +26,8 @@ function(run_ghdl)
     message("${text}")
   endif()
 endfunction()
-set(models)
-foreach(source IN LISTS SOURCES)
-  file(READ ${source} text)
-  string(REGEX REPLACE "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
-                       edited "${text}")
-  if(NOT edited STREQUAL text)
-    get_filename_component(name ${source} NAME)
-    set(source ${DIR}/${name})
-    file(WRITE ${source} "${edited}")
-  endif()
-  list(APPEND models ${source})
-endforeach()
+edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
+               ${SOURCES})
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${models})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
 if(EDIT)

@@ -29,15 +29,12 @@ def waivers(root: pathlib.Path = sources.ROOT) -> dict[tuple[str, str], str]:
     return out
 
 
-def tables(text: str) -> list[tuple[int, str, str, int]]:
-    """Tables outside of blocks: line number, head, text of the section so far and of the table, figures."""
-    out: list[tuple[int, str, str, int]] = []
-    section, inside, count, head, start, in_table = "", False, 0, "", 0, False
+def tables(text: str) -> list[tuple[int, str, int]]:
+    """Tables outside of blocks: line number, head, figures."""
+    out: list[tuple[int, str, int]] = []
+    inside, count, head, start, in_table = False, 0, "", 0, False
     lines = re.sub(r"(?m)^```.*?^```", lambda m: "\n" * m[0].count("\n"), text, flags=re.S).splitlines()
     for number, line in enumerate([*lines, ""], 1):
-        if line.startswith("## ") or line.startswith("# "):
-            section = ""
-        section += line + "\n"
         if re.match(r"<!-- (evidence|cost|dse): ", line):
             inside = True
         elif re.match(r"<!-- /(evidence|cost|dse) ", line):
@@ -49,8 +46,7 @@ def tables(text: str) -> list[tuple[int, str, str, int]]:
             count += sum(bool(_FIGURE.match(cell.strip())) for cell in line.strip("|").split("|")[1:])
         elif in_table:
             in_table = False
-            out.append((start, head, section, count))
-    # A section may say it behind the table.
+            out.append((start, head, count))
     return out
 
 
@@ -61,7 +57,7 @@ def check(root: pathlib.Path = sources.ROOT) -> list[str]:
     for page in page_files(root):
         name, text = str(page.relative_to(root)), page.read_text()
         sections = re.split(r"(?m)^(?=##? )", text)
-        for number, head, _, count in tables(text):
+        for number, head, count in tables(text):
             entry = next((key for key in known if fnmatch.fnmatch(name, key[0]) and head.startswith(key[1])), None)
             if entry:
                 used.add(entry)

@@ -97,14 +97,19 @@ ordered_json cell_counts(const DepthResult& result) {
           {"removed_by_uniqueness", bits[4]}, {"removed_as_speckle", bits[5]}};
 }
 
+// {"upset": 2, "window": 1}
+ordered_json repeated_by_error(const net::LinkFigures& f) {
+  ordered_json counts = ordered_json::object();
+  for (size_t bit = 0; bit < f.repeated_by_error.size(); ++bit)
+    if (f.repeated_by_error[bit] > 0) counts[golden::error_names(1u << bit)] = f.repeated_by_error[bit];
+  return counts;
+}
 // "upset 2, window 1"
 std::string repeated_errors(const net::LinkFigures& f) {
+  const ordered_json counts = repeated_by_error(f);
   std::string text;
-  for (size_t bit = 0; bit < f.repeated_by_error.size(); ++bit) {
-    if (f.repeated_by_error[bit] == 0) continue;
-    text +=
-        (text.empty() ? "" : ", ") + golden::error_names(1u << bit) + " " + std::to_string(f.repeated_by_error[bit]);
-  }
+  for (const auto& [name, count] : counts.items())
+    text += (text.empty() ? "" : ", ") + name + " " + std::to_string(count.get<uint64_t>());
   return text.empty() ? "none" : text;
 }
 
@@ -114,9 +119,6 @@ ordered_json link_report(const LinkRun& link) {
   const double hertz = 1e3 * link.chip.config.clk_khz;
   auto rate = [&](uint64_t bytes) { return f.seconds > 0 ? 8e-6 * static_cast<double>(bytes) / f.seconds : 0; };
   auto time = [&](uint64_t clocks) { return static_cast<double>(clocks) / hertz; };
-  ordered_json by_error = ordered_json::object();
-  for (size_t bit = 0; bit < f.repeated_by_error.size(); ++bit)
-    if (f.repeated_by_error[bit] > 0) by_error[golden::error_names(1u << bit)] = f.repeated_by_error[bit];
   // Clocks by the chip's counters; null if it was silent at the end.
   auto counted = [&](uint64_t clocks) { return f.counters_after.empty() ? ordered_json() : ordered_json(clocks); };
   return {{"peer", link.peer},
@@ -135,7 +137,7 @@ ordered_json link_report(const LinkRun& link) {
           {"sessions", s.sessions},
           {"timeouts", s.timeouts},
           {"tiles_repeated", f.tiles_repeated},
-          {"tiles_repeated_by_error", by_error},
+          {"tiles_repeated_by_error", repeated_by_error(f)},
           {"tiles_unconfirmed", f.tiles_unconfirmed},
           {"counters_known", !f.counters_after.empty()},
           {"rtt_ms", 1e3 * s.rtt},

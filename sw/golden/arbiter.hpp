@@ -210,9 +210,7 @@ class Arbiter {
   std::vector<uint32_t> status() const {
     Bytes bytes;
     append_status(bytes);
-    std::vector<uint32_t> words(bytes.size() / 4);
-    for (size_t i = 0; i < words.size(); ++i) words[i] = net::get32(bytes, 4 * i);
-    return words;
+    return net::words_of(bytes, 0);
   }
 
   bool session_open() const { return open_; }

@@ -2,6 +2,7 @@
 // Words on the streams of entity psweep (docs/interfaces.md): register writes of a tile and of the plane table, map
 // cells, names of the error bits. Addresses and bits themselves: golden/control.hpp.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -34,18 +35,21 @@ inline std::vector<RegisterWrite> job_writes(const TileJob& t) {
   return w;
 }
 
+// The words of one plane, in the order of their addresses.
+inline std::array<uint32_t, 8> table_words(const PlaneEntry& p) {
+  return {static_cast<uint32_t>(p.x0_left),
+          static_cast<uint32_t>(p.y0_left),
+          static_cast<uint32_t>(p.x0_right),
+          static_cast<uint32_t>(p.y0_right),
+          p.dx_left,
+          p.dy_left,
+          p.dx_right,
+          p.dy_right};
+}
 inline std::vector<RegisterWrite> table_writes(const std::vector<PlaneEntry>& table) {
   std::vector<RegisterWrite> w;
   for (size_t k = 0; k < table.size(); ++k) {
-    const PlaneEntry& p = table[k];
-    const uint32_t fields[8] = {static_cast<uint32_t>(p.x0_left),
-                                static_cast<uint32_t>(p.y0_left),
-                                static_cast<uint32_t>(p.x0_right),
-                                static_cast<uint32_t>(p.y0_right),
-                                p.dx_left,
-                                p.dy_left,
-                                p.dx_right,
-                                p.dy_right};
+    const auto fields = table_words(table[k]);
     for (size_t f = 0; f < 8; ++f) w.push_back({static_cast<uint16_t>(kRegTable + 8 * k + f), fields[f]});
   }
   return w;

@@ -20,18 +20,11 @@ constexpr double kBrief = 1;             // seconds, or so many round trips:
 constexpr double kBriefTrips = 8;
 constexpr int kMostGone = 8;      // sessions that are gone before their first status
 constexpr int kMostRefusals = 3;  // of INFO or COUNTERS: the request may have been damaged on its way
-constexpr size_t kIpUdpHeaders = 28;
 
 std::string seconds(double s) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f s", s);
   return text;
-}
-
-std::vector<uint32_t> words_of(const Bytes& packet) {
-  std::vector<uint32_t> words((packet.size() - kHeaderBytes) / 4);
-  for (size_t i = 0; i < words.size(); ++i) words[i] = get32(packet, kHeaderBytes + 4 * i);
-  return words;
 }
 
 }  // namespace
@@ -266,7 +259,7 @@ std::optional<Event> Client::take(const Bytes& packet) {
     ++statistics_.malformed;
     return std::nullopt;
   }
-  r.words = words_of(packet);
+  r.words = words_of(packet, kHeaderBytes);
   const bool bare = r.words.empty();
   bool good;
   if (sent.type == kOpen) {

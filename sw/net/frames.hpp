@@ -24,6 +24,9 @@ struct Address {
   uint32_t ip = 0;
   uint16_t port = 0;  // UDP only
 };
+inline bool operator==(const Address& a, const Address& b) {
+  return a.mac == b.mac && a.ip == b.ip && a.port == b.port;
+}
 
 // Frame check sequence as a number; it is sent least significant byte first (IEEE 802.3, 3.2.9).
 inline uint32_t crc32(const uint8_t* data, size_t size) {

@@ -194,6 +194,13 @@ inline void append32(Bytes& b, uint32_t v) {
   append16(b, v & 0xffff);
 }
 
+// The 32-bit words from a byte on; what is left behind the last whole one does not count.
+inline std::vector<uint32_t> words_of(const Bytes& b, size_t from) {
+  std::vector<uint32_t> words((b.size() - from) / 4);
+  for (size_t i = 0; i < words.size(); ++i) words[i] = get32(b, from + 4 * i);
+  return words;
+}
+
 struct Header {
   uint8_t type = 0;
   uint32_t token = 0;

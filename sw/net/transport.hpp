@@ -9,6 +9,8 @@
 
 namespace psweep::net {
 
+constexpr size_t kIpUdpHeaders = 28;  // of a packet, in front of its payload
+
 // The largest payload that goes out in one packet, and what sets it: "interface eth0 has an MTU of 1400".
 struct Largest {
   size_t payload = 0;

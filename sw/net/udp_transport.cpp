@@ -24,7 +24,6 @@ namespace {
 
 // A map of the largest tiles, so that nothing is lost while this process does not run.
 constexpr int kReceiveBuffer = 4 << 20;
-constexpr size_t kIpUdpHeaders = 28;
 
 class UdpTransport : public Transport {
  public:

@@ -3,6 +3,7 @@
 // the chip's own work takes none but for the engine. So tools of the host are tried at the wire's speed without the
 // RTL, and many times faster.
 #pragma once
+#include <algorithm>
 #include <vector>
 
 #include "chip/echo_chip.hpp"
@@ -24,9 +25,9 @@ class ModelChip : public EchoChip {
  protected:
   std::optional<net::Bytes> reply(const net::UdpPacket& udp) override {
     step();
-    uint32_t peer = 0;
-    while (peer < peers_.size() && !same(peers_[peer], udp.from)) ++peer;
-    if (peer == peers_.size()) peers_.push_back(udp.from);
+    const auto at = std::find(peers_.begin(), peers_.end(), udp.from);
+    const auto peer = static_cast<uint32_t>(at - peers_.begin());
+    if (at == peers_.end()) peers_.push_back(udp.from);
     auto replies = arbiter_.message(udp.payload, peer);
     if (replies.empty()) return std::nullopt;
     return std::move(replies.front());
@@ -40,9 +41,6 @@ class ModelChip : public EchoChip {
 
  private:
   void step() { arbiter_.step(static_cast<double>(now()) / kSecond); }
-  static bool same(const net::Address& a, const net::Address& b) {
-    return a.mac == b.mac && a.ip == b.ip && a.port == b.port;
-  }
 
   golden::Arbiter arbiter_;
   std::vector<net::Address> peers_;  // their places are their numbers

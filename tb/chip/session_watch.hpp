@@ -73,13 +73,10 @@ class SessionWatch {
       heard_ = wall_;
       asked_ = 0;
       next_ = 0;
-    } else if (owner_ && h->token == token_ && same(p->from, *owner_) && h->index != kIndex) {
+    } else if (owner_ && h->token == token_ && p->from == *owner_ && h->index != kIndex) {
       heard_ = wall_;
       next_ = 0;
     }
-  }
-  static bool same(const net::Address& a, const net::Address& b) {
-    return a.mac == b.mac && a.ip == b.ip && a.port == b.port;
   }
 
   Desk& desk_;

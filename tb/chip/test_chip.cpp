@@ -431,8 +431,7 @@ struct Crowd {
     std::vector<net::Bytes> payloads;
     for (const net::Bytes& f : frames) {
       const auto packet = net::parse_udp(f);
-      if (packet && packet->to.mac == host.mac && packet->to.ip == host.ip && packet->to.port == host.port)
-        payloads.push_back(packet->payload);
+      if (packet && packet->to == host) payloads.push_back(packet->payload);
     }
     frames.clear();
     return payloads;

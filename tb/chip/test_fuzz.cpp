@@ -25,6 +25,7 @@
 //   Time    : frames come while the engine is at rest, held up or in the middle of a sweep; the model's clock is the
 //             chip's. No frame is decided on in the clocks around a millisecond's tick, in which the answers that are
 //             left may be one more or less
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -272,11 +273,8 @@ class Fuzz {
     if (!model_.session_open()) return 0;
     const net::Address& peer = peers_[model_.map_peer()];
     for (int i = 0; i < 3; ++i)
-      if (equal(hosts_[static_cast<size_t>(i)], peer)) return i;
+      if (hosts_[static_cast<size_t>(i)] == peer) return i;
     return 0;
-  }
-  static bool equal(const net::Address& a, const net::Address& b) {
-    return a.mac == b.mac && a.ip == b.ip && a.port == b.port;
   }
 
   // Frames ------------------------------------------------------------------------------------------------------------
@@ -357,10 +355,10 @@ class Fuzz {
     } else {
       Bytes m(f.begin() + 42, f.begin() + 42 + length);
       if (m.size() >= 16) net::put32(m, 4, swapped(net::get32(m, 4)));
-      size_t number = 0;
-      while (number < peers_.size() && !equal(peers_[number], peer)) ++number;
-      if (number == peers_.size()) peers_.push_back(peer);
-      message_arrives(m, static_cast<uint32_t>(number));
+      const auto at = std::find(peers_.begin(), peers_.end(), peer);
+      const auto number = static_cast<uint32_t>(at - peers_.begin());
+      if (at == peers_.end()) peers_.push_back(peer);
+      message_arrives(m, number);
     }
   }
   // tile_clocks shown are those of the latest tile that was done.

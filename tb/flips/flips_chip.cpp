@@ -350,9 +350,7 @@ struct Host {
     }
     if (h.flags == net::kBadMessage) return;  // something made it so; asked again
     if ((message.size() - net::kHeaderBytes) % 4 != 0) return;
-    std::vector<uint32_t> words((message.size() - net::kHeaderBytes) / 4);
-    for (size_t i = 0; i < words.size(); ++i) words[i] = net::get32(message, net::kHeaderBytes + 4 * i);
-    const auto s = net::parse_status(words);
+    const auto s = net::parse_status(net::words_of(message, net::kHeaderBytes));
     if (!s || s->bitmap.size() != (static_cast<size_t>(work->config.slots()) + 31) / 32) return;
     if (phase == Phase::kLook) {
       errors = s->errors;
@@ -777,8 +775,7 @@ class Campaign {
   }
   static std::string group(const Site& s) {
     const std::string entity = s.entity, name = s.name;
-    if (entity == "cdc_sync" || entity == "reset_sync" || entity == "async_fifo" || entity == "clock_watch")
-      return "crossings and resets";
+    if (entity == "cdc_sync" || entity == "reset_sync" || entity == "async_fifo") return "crossings and resets";
     if (name.rfind("u_engine.", 0) == 0) return entity == "control" ? "engine: control" : "engine: rest";
     if (entity.rfind("ram_", 0) == 0) {
       // Words that are read belong to the unit that reads them.

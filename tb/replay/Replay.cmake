@@ -3,21 +3,12 @@
 # Analyses the original VHDL and the bench, replays FILE, prints the bench's report. Fails with it.
 # Generics are those in FILE. Memories start with 'U' here: their start value (rtl/ram_*.vhd) would hide a word that is
 # used before it was written.
+include(${CMAKE_CURRENT_LIST_DIR}/../../scripts/cmake/EditedSources.cmake)
 string(REPLACE "|" ";" SOURCES "${SOURCES}")
 file(REMOVE_RECURSE ${DIR})
 file(MAKE_DIRECTORY ${DIR})
-set(analysed)
-foreach(source IN LISTS SOURCES)
-  file(READ ${source} text)
-  string(REGEX REPLACE "-- synthesis translate_off[ \n]*:= [(]others => [(][^\n]*[ \n]*-- synthesis translate_on" ""
-                       bare "${text}")
-  if(NOT bare STREQUAL text)
-    get_filename_component(name ${source} NAME)
-    file(WRITE ${DIR}/${name} "${bare}")
-    set(source ${DIR}/${name})
-  endif()
-  list(APPEND analysed ${source})
-endforeach()
+edited_sources(analysed ${DIR}
+               "-- synthesis translate_off[ \n]*:= [(]others => [(][^\n]*[ \n]*-- synthesis translate_on" "" ${SOURCES})
 execute_process(COMMAND ${GHDL} -a ${STANDARD} --workdir=${DIR} ${analysed} ${BENCH} RESULT_VARIABLE code
                 ERROR_VARIABLE log)
 if(NOT code EQUAL 0)

@@ -15,6 +15,7 @@
 #include "Vaddress_generator_rectified.h"
 #include "golden/address_generator.hpp"
 #include "golden/control.hpp"
+#include "golden/registers.hpp"
 #include "golden/storage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -110,15 +111,7 @@ struct Bench : Agent {
   void load(const golden::TileJob& t, const std::vector<golden::PlaneEntry>& table) {
     dut.table_we = 1;
     for (size_t k = 0; k < table.size(); ++k) {
-      const auto& p = table[k];
-      const uint32_t words[8] = {static_cast<uint32_t>(p.x0_left),
-                                 static_cast<uint32_t>(p.y0_left),
-                                 static_cast<uint32_t>(p.x0_right),
-                                 static_cast<uint32_t>(p.y0_right),
-                                 p.dx_left,
-                                 p.dy_left,
-                                 p.dx_right,
-                                 p.dy_right};
+      const auto words = golden::table_words(table[k]);
       for (size_t f = 0; f < 8; ++f) {
         dut.table_addr = static_cast<std::remove_reference_t<decltype(dut.table_addr)>>(8 * k + f);
         write_data(words[f]);
@@ -351,16 +344,6 @@ TEST_CASE("address_generator: a bit of a table or offset word that is wrong is t
   constexpr int kRows = 3, kCols = 5;  // rows shorter than their eight clocks
   const uint64_t row = golden::kRowMin;
   bench.load(t, table);
-  auto words_of = [](const golden::PlaneEntry& p) {
-    return std::array<uint32_t, 8>{static_cast<uint32_t>(p.x0_left),
-                                   static_cast<uint32_t>(p.y0_left),
-                                   static_cast<uint32_t>(p.x0_right),
-                                   static_cast<uint32_t>(p.y0_right),
-                                   p.dx_left,
-                                   p.dy_left,
-                                   p.dx_right,
-                                   p.dy_right};
-  };
   auto run = [&] {
     bench.expected.clear();
     bench.word_errors.clear();
@@ -375,7 +358,7 @@ TEST_CASE("address_generator: a bit of a table or offset word that is wrong is t
   for (int field = 0; field < 8; ++field) {
     for (int bit = 0; bit <= 32; ++bit) {
       INFO("field " << field << " bit " << bit);
-      const uint32_t word = words_of(table[1])[static_cast<size_t>(field)];
+      const uint32_t word = golden::table_words(table[1])[static_cast<size_t>(field)];
       bench.dut.table_we = 1;
       bench.dut.table_addr = static_cast<std::remove_reference_t<decltype(bench.dut.table_addr)>>(8 + field);
       bench.write_data(word, bit);

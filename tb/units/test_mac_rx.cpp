@@ -12,6 +12,7 @@
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"
+#include "support/upset.hpp"
 
 using namespace psweep;
 using namespace psweep::golden;
@@ -419,11 +420,7 @@ TEST_CASE("mac_rx: tick shows that there is a clock") {
 
 namespace {
 
-struct Site {
-  const char* name;
-  int bits;
-};
-const std::vector<Site> kSites = {
+const std::vector<UpsetSite> kSites = {
 #include "mac_rx_upset.inc"
 };
 

@@ -14,6 +14,7 @@
 #include "support/mii_bus.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"
+#include "support/upset.hpp"
 
 using namespace psweep;
 using namespace psweep::golden;
@@ -430,11 +431,7 @@ TEST_CASE("mac_tx: sending is tx_en a clock before, and tick never rests") {
 
 namespace {
 
-struct Site {
-  const char* name;
-  int bits;
-};
-const std::vector<Site> kSites = {
+const std::vector<UpsetSite> kSites = {
 #include "mac_tx_upset.inc"
 };
 

@@ -18,6 +18,7 @@
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"
+#include "support/upset.hpp"
 
 using namespace psweep;
 using namespace psweep::tb;
@@ -768,11 +769,7 @@ TEMPLATE_TEST_CASE("packet_rx: reset in the middle of anything leaves nothing", 
 
 namespace {
 
-struct Site {
-  const char* name;
-  int bits;
-};
-const std::vector<Site> kSites = {
+const std::vector<UpsetSite> kSites = {
 #include "packet_rx_upset.inc"
 };
 

@@ -17,6 +17,7 @@
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"
+#include "support/upset.hpp"
 
 using namespace psweep;
 using namespace psweep::tb;
@@ -439,11 +440,7 @@ TEMPLATE_TEST_CASE("packet_tx: abort at any time, the frame is forgotten, what w
 
 namespace {
 
-struct Site {
-  const char* name;
-  int bits;
-};
-const std::vector<Site> kSites = {
+const std::vector<UpsetSite> kSites = {
 #include "packet_tx_upset.inc"
 };
 
