@@ -157,7 +157,6 @@ architecture rtl of responder is
   constant C_CLOSE    : std_logic_vector(7 downto 0) := x"02";
   constant C_INFO     : std_logic_vector(7 downto 0) := x"03";
   constant C_COUNTERS : std_logic_vector(7 downto 0) := x"04";
-  constant C_STATUS   : std_logic_vector(7 downto 0) := x"05";
   constant C_TABLE    : std_logic_vector(7 downto 0) := x"06";
   constant C_START    : std_logic_vector(7 downto 0) := x"07";
   constant C_WRITE    : std_logic_vector(7 downto 0) := x"08";
@@ -295,6 +294,7 @@ architecture rtl of responder is
   -- Session.
   signal open_q      : std_logic;
   signal store      : std_logic; -- OPEN and READ: what the session's memory is to keep is in this frame
+  signal peer_shift : unsigned(2 downto 0); -- from place to index, halved
   signal at_peer    : std_logic; -- byte place is the sender's MAC, IP or port
   signal at_head    : std_logic; -- .. of the message's header
   signal at_token   : std_logic;
@@ -464,10 +464,11 @@ begin
   peer_bank  <= store;
   peer_we    <= have and to_bit(state = C_ST_PEER) and at_peer when m_kind /= C_KIND_ARP
                 else have and to_bit(state = C_ST_PEER and place >= 22 and place < 32);
-  -- All modulo 16.
-  peer_index <= std_logic_vector(place(3 downto 0) - 6) when m_kind = C_KIND_ARP or place < 16
-                else std_logic_vector(place(3 downto 0) + 8) when place(5) = '1'
-                else std_logic_vector(place(3 downto 0) - 4);
+  -- place - 6 in ARP and for MAC, place - 20 for IP, place - 24 for the port; modulo 16.
+  peer_shift <= "101" when m_kind = C_KIND_ARP or place(5 downto 4) = 0
+                else "100" when place(5) = '1'
+                else "110";
+  peer_index <= std_logic_vector(place(3 downto 1) + peer_shift) & place(0);
 
   -- The session's memory ---------------------------------------------------------------------------------------------
   -- OPEN writes addresses and nonce, and the new token in place of its own header's; READ writes its header, and the

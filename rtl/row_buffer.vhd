@@ -21,8 +21,8 @@
 --   fail     : the launched tile has failed in the engine: if its rows, or its last pair, are still here, as clear.
 --              Rows of the next tile stay
 --   staged   : from the clock after open_tile until go
---   Upsets   : idle, clearing, staged and running differ in two bits; any other code: as clear, and recovered for a
---              clock. A tile that was inside is lost
+--   Upsets   : idle, clearing, staged and running differ in two bits. Any other code, and a chunk whose last pair was
+--              not read from the slot of base: as clear, and recovered for a clock. A tile that was inside is lost
 --   Golden   : sw/golden/row_buffer.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -90,6 +90,7 @@ architecture rtl of row_buffer is
   signal active    : std_logic;
   signal illegal   : std_logic;
   signal wipe      : std_logic;
+  signal strayed   : std_logic; -- the chunk that has just ended did so in another slot
   signal chunks    : unsigned(15 downto 0);
   signal base_q    : unsigned(15 downto 0);
   signal base_slot : unsigned(C_SLOT_W - 1 downto 0); -- base mod G_SLOTS
@@ -178,9 +179,9 @@ begin
   staged    <= staged_q;
   active    <= staged_q or running;
   illegal   <= (busy_q xor staged_q xor running xor clearing) or (not busy_q and (staged_q or running or clearing));
-  recovered <= illegal and not rst;
+  recovered <= (illegal or strayed) and not rst;
   -- Without the row of its last pair the tile is over, but that pair would become the first of the next one.
-  wipe      <= clear or illegal or (fail and (running or (out_valid and not staged_q)));
+  wipe      <= clear or illegal or strayed or (fail and (running or (out_valid and not staged_q)));
   base      <= std_logic_vector(base_q);
   received  <= std_logic_vector(stored);
   left_one  <= to_bit(left = 1);
@@ -190,6 +191,9 @@ begin
   p_tile : process (clk)
   begin
     if rising_edge(clk) then
+      -- Of a full chunk: r_addr and base_slot go through a tile apart. The low bits tell slots apart.
+      strayed  <= chunk_end and not left_one and not rst
+                  and to_bit(r_addr(C_SLOT_W - 1 downto 0) /= base_slot + (C_LAST mod 2 ** C_SLOT_W));
       complete <= active and (to_bit(stored = chunks) or to_bit(stored = G_SLOTS));
       if go = '1' and staged_q = '1' then
         staged_q <= '0';

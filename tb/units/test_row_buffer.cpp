@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // row_buffer: chunks in any order with duplicates and some outside of the window, whole tiles and rings, stalls on both
-// sides, clears in every state, tiles back to back; every answer, status word, bitmap bit and pixel against the model.
+// sides, clears in every state, tiles back to back; every answer, status word, bitmap bit and pixel against the model;
+// upsets of every bit of every register.
 #include <algorithm>
 #include <deque>
 #include <random>
@@ -12,10 +13,12 @@
 #include "Vrow_buffer_8_5_64.h"
 #include "Vrow_buffer_8_6_70.h"
 #include "Vrow_buffer_8_704_70.h"
+#include "Vrow_buffer_upset.h"
 #include "golden/row_buffer.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"
+#include "support/upset.hpp"
 
 using namespace psweep;
 using namespace psweep::tb;
@@ -402,4 +405,127 @@ TEST_CASE("row_buffer: a pixel per clock from the first to the last") {
 TEST_CASE("row_buffer: the sizes of 44-30-13-13 and of 256 x 130 tiles, whole tile and ring") {
   run_tiles<Vrow_buffer_8_704_70>({8, 704, 70}, {0.0, 0.0, 0.2, 0.0, false, 0.001, true}, 70, 2);
   run_tiles<Vrow_buffer_8_704_70>({8, 704, 70}, {0.0, 0.1, 0.2, 0.0, false, 0.001, true}, 150, 1);
+}
+
+namespace {
+
+const std::vector<UpsetSite> kSites = {
+#include "row_buffer_upset.inc"
+};
+
+// Whole tiles, written before they go, as the chip's responder and a host with a time limit would do it.
+struct TileHost {
+  static constexpr int kPairs = 12, kSlots = 5, kChunks = 4, kPixels = kPairs * kChunks - 3;
+  enum class End { kRight, kWrong, kLost };
+
+  Sim<Vrow_buffer_upset> sim{100000000, test_seed()};
+  Vrow_buffer_upset& dut = sim.dut();
+  std::mt19937 random{test_seed() + 37};
+  std::vector<uint16_t> sent, got;
+  uint64_t recovered = 0;
+  int site = 0, flip_in = -1;  // the upset, and clocks until then
+
+  TileHost() {
+    dut.clear = dut.open_tile = dut.w_check = dut.w_valid = dut.w_commit = dut.go = dut.b_hold = dut.fail = 0;
+    dut.flip_site = 0;
+    dut.flip_mask = 0;
+    dut.m_tready = 1;
+    sim.reset();
+    while (dut.busy) tick();
+  }
+
+  void tick() {
+    dut.flip_site = static_cast<SData>(flip_in == 0 ? site : 0);
+    dut.eval();
+    if (dut.m_tvalid && dut.m_tready) got.push_back(dut.m_tdata);
+    recovered += dut.recovered;
+    sim.tick();
+    if (flip_in >= 0) --flip_in;
+  }
+
+  // An upset of that register (0: of none) so many clocks after go; what the host sees of the tile.
+  End tile(int flip_site, int bit, int clocks) {
+    sent.clear();
+    got.clear();
+    dut.open_pixels = kPixels;
+    dut.open_chunks = kChunks;
+    dut.open_tile = 1;
+    tick();
+    dut.open_tile = 0;
+    for (int chunk = 0; chunk < kChunks; ++chunk) {
+      dut.w_check = 1;
+      dut.w_chunk = static_cast<SData>(chunk);
+      tick();
+      dut.w_check = 0;
+      tick();
+      tick();
+      for (int i = 0; i < kPairs; ++i) {
+        const uint16_t pair = static_cast<uint16_t>(random());
+        if (static_cast<int>(sent.size()) < kPixels) sent.push_back(static_cast<uint16_t>(pair >> 8 | pair << 8));
+        for (const int shift : {8, 0}) {
+          dut.w_valid = 1;
+          dut.w_data = static_cast<CData>(pair >> shift);
+          tick();
+        }
+      }
+      dut.w_valid = 0;
+      dut.w_commit = 1;
+      tick();
+      dut.w_commit = 0;
+    }
+    tick();
+    dut.go = 1;
+    tick();
+    dut.go = 0;
+    dut.flip_mask = uint64_t{1} << bit;
+    site = flip_site;
+    flip_in = clocks;
+    for (int i = 0; i < 4 * kPixels && (i < kPixels + 20 || dut.busy); ++i) tick();
+    flip_in = -1;
+    return got == sent ? End::kRight : static_cast<int>(got.size()) >= kPixels ? End::kWrong : End::kLost;
+  }
+
+  void clear() {
+    dut.clear = 1;
+    tick();
+    dut.clear = 0;
+    dut.eval();
+    for (int i = 0; i < 40 && dut.busy; ++i) tick();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("row_buffer: no upset outlives its tile, and a lost place of the output never makes a whole wrong tile") {
+  TileHost host;
+  REQUIRE(host.tile(0, 0, 0) == TileHost::End::kRight);
+  // The last full chunk ends so many clocks after go.
+  const int full = TileHost::kPairs * (TileHost::kChunks - 1) + 1;
+  int flips = 0, lost = 0, wrong = 0, place = 0;
+  for (size_t site = 0; site < kSites.size(); ++site) {
+    for (int bit = 0; bit < kSites[site].bits; ++bit) {
+      for (int round = 0; round < 12; ++round) {
+        const int clocks = static_cast<int>(host.random() % (TileHost::kPixels + 6));
+        INFO("register " << kSites[site].name << " bit " << bit << ", " << clocks << " clocks after go");
+        const auto end = host.tile(static_cast<int>(site) + 1, bit, clocks);
+        ++flips;
+        lost += end == TileHost::End::kLost;
+        wrong += end == TileHost::End::kWrong;
+        const std::string name = kSites[site].name;
+        if ((name == "r_addr" || name == "base_slot") && clocks < full - 2) {
+          ++place;
+          CHECK(end != TileHost::End::kWrong);
+        }
+        host.clear();
+        REQUIRE(host.dut.busy == 0);
+        REQUIRE(host.tile(0, 0, 0) == TileHost::End::kRight);
+      }
+    }
+  }
+  INFO(flips << " upsets, " << lost << " tiles lost, " << wrong << " wrong, recovered " << host.recovered);
+  CHECK(flips > 1000);
+  CHECK(place > 60);
+  CHECK(lost > 100);
+  CHECK(host.recovered > 50);
+  CHECK(wrong > 0);  // pixels on their way have no parity
 }
