@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Wireshark dissector of the psweep protocol, version 2 (docs/protocol.md; constants: sw/net/protocol.hpp).
+-- Wireshark dissector of the psweep protocol, version 2 (docs/protocol.md; constants: sw/contract/protocol.hpp).
 --
 --   wireshark -X lua_script:scripts/psweep.lua wire.pcap        (other ways, filters, fields: docs/wireshark.md)
 --

@@ -10,6 +10,7 @@
 
 #include "core/error.hpp"
 #include "fast/fast.hpp"
+#include "golden/control.hpp"
 #include "net/udp_transport.hpp"
 #ifdef PSWEEP_HAVE_RTL
 #include "rtl/rtl_engine.hpp"
@@ -110,8 +111,8 @@ EngineRun run_link_engine(const EngineRequest& r, const Gray& left, const Gray& 
       client, link.chip, plan.table, static_cast<int>(plan.tiles.size()), options,
       [&](int i) {
         const PlacedTile& t = plan.tiles[i];
-        return net::LinkTile{t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
-                             cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+        return golden::TileInput{t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                                 cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
       },
       [&](int i, std::vector<golden::MapCell> out) { cells[i] = std::move(out); },
       [&](uint64_t done) { progress(done, all); });
@@ -201,8 +202,8 @@ EngineRun run_rtl_engine(const Gray& left, const Gray& right, SweepSetup setup, 
         *chosen, plan.table, static_cast<int>(plan.tiles.size()), threads,
         [&](int i) {
           const PlacedTile& t = plan.tiles[i];
-          return rtl::TileInput{t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
-                                cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+          return golden::TileInput{t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                                   cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
         },
         [&](int i, rtl::TileOutput out) {
           if (out.window_errors != 0) {

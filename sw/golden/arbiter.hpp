@@ -23,9 +23,10 @@
 #include <optional>
 #include <vector>
 
+#include "contract/protocol.hpp"
+#include "contract/registers.hpp"
+#include "golden/control.hpp"
 #include "golden/psweep.hpp"
-#include "golden/registers.hpp"
-#include "net/protocol.hpp"
 
 namespace psweep::golden {
 

@@ -1,43 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Model of entity control and of the engine's timing: register addresses, states, error bits, latencies and the clocks
-// of a tile. Constants mirror rtl/psweep_pkg.vhd and rtl/control.vhd; the bench compares measured clocks with them.
+// Model of entity control: the engine's timing, i.e. the latencies of its stages and the clocks of a tile. Constants
+// mirror rtl/psweep_pkg.vhd and rtl/control.vhd; the bench compares measured clocks with them. Registers, states and
+// error bits: contract/registers.hpp.
 #pragma once
 #include <algorithm>
 #include <cstdint>
 
-#include "golden/config.hpp"
+#include "contract/registers.hpp"
 
 namespace psweep::golden {
-
-// Registers: address of a write on s_cfg. Plane table: kRegTable + 8 * plane + field.
-enum Register : uint16_t {
-  kRegCommand = 0x00,
-  kRegTileCols = 0x01,
-  kRegTileRows = 0x02,
-  kRegWinCols = 0x03,
-  kRegWinRows = 0x04,
-  kRegPlanes = 0x05,
-  kRegThreshold = 0x06,
-  kRegTx = 0x08,     // left x, left y, right x, right y
-  kRegLeft = 0x10,   // x_lo, x_hi, y_lo, y_hi
-  kRegRight = 0x14,  // likewise
-  kRegTable = 0x8000,
-};
-enum CommandBit : uint32_t { kCommandStart = 1 << 0, kCommandAbort = 1 << 1, kCommandClear = 1 << 2 };
-
-enum class State { kIdle = 0, kLoad = 1, kSweep = 2, kFlush = 3, kUnload = 4, kDrain = 5 };
-
-// Port errors.
-enum ErrorBit : uint8_t {
-  kErrorConfig = 1 << 0,   // a size register out of range (or never written) at start
-  kErrorTable = 1 << 1,    // more planes than written to the table
-  kErrorShort = 1 << 2,    // tlast before the last pixel
-  kErrorLong = 1 << 3,     // no tlast on the last pixel
-  kErrorWindow = 1 << 4,   // a sample inside both images is not loaded
-  kErrorAddress = 1 << 5,  // unknown register, or a table word out of order or range
-  kErrorBusy = 1 << 6,     // write or start while a tile is in work
-  kErrorUpset = 1 << 7,    // RTL alone: a state or an end of the map that cannot be; the tile is dropped
-};
 
 // Clocks from the first input to the first output of an entity.
 constexpr int kAddressLatency = 9;

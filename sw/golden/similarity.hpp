@@ -4,7 +4,7 @@
 // The entity keeps vertical sums of M rows per column and a horizontal running sum of M columns, of samples less an
 // offset and mirrored; all being exact integers, its numerator and denominator equal the plain ones below.
 #pragma once
-#include "golden/config.hpp"
+#include "contract/config.hpp"
 
 namespace psweep::golden {
 

@@ -12,8 +12,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "golden/config.hpp"
-#include "net/protocol.hpp"
+#include "contract/config.hpp"
+#include "contract/protocol.hpp"
 
 namespace psweep {
 

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "chip/chip_model.hpp"
-#include "net/frames.hpp"
+#include "contract/frames.hpp"
 
 namespace psweep::chip {
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "chip/chip_model.hpp"
+#include "contract/frames.hpp"
 #include "core/error.hpp"
-#include "net/frames.hpp"
 
 namespace psweep::chip {
 

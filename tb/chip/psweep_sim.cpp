@@ -14,8 +14,8 @@
 #include "chip/chip_transport.hpp"
 #include "chip/session_watch.hpp"
 #include "chip/tap.hpp"
+#include "contract/protocol.hpp"
 #include "core/error.hpp"
-#include "net/protocol.hpp"
 
 namespace psweep::chip {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "chip/desk.hpp"
-#include "net/frames.hpp"
+#include "contract/frames.hpp"
 
 namespace psweep::chip {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "net/frames.hpp"
+#include "contract/frames.hpp"
 
 namespace psweep::chip {
 

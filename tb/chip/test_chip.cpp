@@ -12,12 +12,13 @@
 #include <set>
 
 #include "chip/chip_transport.hpp"
+#include "contract/registers.hpp"
 #include "core/error.hpp"
 #include "engine/stimulus.hpp"
+#include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "net/link_engine.hpp"
 #include "plan/planner.hpp"
-#include "rtl/registers.hpp"
 #include "scene/scene.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -109,8 +110,8 @@ struct Bench {
     REQUIRE(count > 1);
     auto input = [&](int i) {
       const PlacedTile& t = plan.tiles[static_cast<size_t>(i)];
-      return net::LinkTile{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
-                           cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+      return golden::TileInput{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                               cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
     };
     Scoreboard board("cell");
     std::set<int> done;
@@ -124,14 +125,14 @@ struct Bench {
     figures = net::run_link_tiles(
         client, capabilities, plan.table, count, options, input,
         [&](int i, const std::vector<golden::MapCell>& cells) {
-          const net::LinkTile in = input(i);
+          const golden::TileInput in = input(i);
           if (done.insert(i).second) clocks += golden::engine_clocks(format, in.job) + net::kFirstPairClocks;
           const auto model = golden::run_tile(format, in.job, plan.table, in.left, in.right);
           REQUIRE(cells.size() == model.cells.size());
           last_map = desk.now();
           if (static_cast<int>(done.size()) == count) transport.flood.clear();
           for (size_t at = 0; at < cells.size(); ++at)
-            board.compare(rtl::pack_cell(format, cells[at]), rtl::pack_cell(format, model.cells[at]),
+            board.compare(golden::pack_cell(format, cells[at]), golden::pack_cell(format, model.cells[at]),
                           {i, -1, static_cast<int>(at) % in.job.tile_cols, static_cast<int>(at) / in.job.tile_cols},
                           static_cast<uint64_t>(desk.clocks()));
         },
@@ -504,7 +505,7 @@ struct TileMessages {
       const size_t at = size_t{chunk} * static_cast<size_t>(config.chunk_pairs()) + static_cast<size_t>(i);
       uint32_t value = 0;
       if (at < tile.left.data.size())
-        value = uint32_t{tile.left.data[at]} << config.engine.pix_bits | tile.right.data[at];
+        value = net::pack_wire_pair(config.engine, tile.left.data[at], tile.right.data[at]);
       for (int b = config.pair_bytes() - 1; b >= 0; --b) body.push_back(static_cast<uint8_t>(value >> 8 * b));
     }
     return numbered(net::kWrite, token, number, chunk, body, net::kFlagAnswer);

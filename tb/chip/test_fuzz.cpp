@@ -643,7 +643,7 @@ class Fuzz {
     for (int i = 0; i < config_.chunk_pairs(); ++i) {
       const size_t at = static_cast<size_t>(chunk) * config_.chunk_pairs() + i;
       uint32_t value = 0;
-      if (at < t.left.data.size()) value = uint32_t{t.left.data[at]} << config_.engine.pix_bits | t.right.data[at];
+      if (at < t.left.data.size()) value = net::pack_wire_pair(config_.engine, t.left.data[at], t.right.data[at]);
       for (int s = config_.pair_bytes() - 1; s >= 0; --s) b.push_back(static_cast<uint8_t>(value >> 8 * s));
     }
     return b;

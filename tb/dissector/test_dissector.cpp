@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // scripts/psweep.lua in tshark: every field of every message with its value and place, messages cut at every length,
 // what links requests and replies, other ports, rubbish, and a session of the simulated chip. Numbers and bytes come
-// from sw/net/protocol.hpp; what tshark shows comes from its PDML.
+// from sw/contract/protocol.hpp; what tshark shows comes from its PDML.
 // Where there is no tshark that runs Lua scripts each case says SKIPPED and why.
 #include <cstdio>
 #include <fstream>
@@ -9,10 +9,10 @@
 
 #include "chip/chip_transport.hpp"
 #include "chip/pcap.hpp"
+#include "contract/registers.hpp"
 #include "dissector/messages.hpp"
 #include "dissector/pdml.hpp"
 #include "engine/stimulus.hpp"
-#include "golden/registers.hpp"
 #include "net/link_engine.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_dir.hpp"
@@ -930,7 +930,7 @@ TEST_CASE("dissector: a session of the simulated chip, every field of every pack
   net::run_link_tiles(
       client, capabilities, s.table, 6, {},
       [&](int) {
-        return net::LinkTile{s.job, s.left, s.right};
+        return golden::TileInput{s.job, s.left, s.right};
       },
       [&](int, const std::vector<golden::MapCell>&) { ++done; }, [](uint64_t) {});
   REQUIRE(done == 6);

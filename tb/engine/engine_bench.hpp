@@ -10,10 +10,10 @@
 #include <sstream>
 #include <string>
 
+#include "contract/registers.hpp"
 #include "engine/stimulus.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
-#include "rtl/registers.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/stream.hpp"
@@ -57,19 +57,19 @@ class EngineBench : public Agent {
 
   // Stimuli
   // ------------------------------------------------------------------------------------------------------------
-  void write(uint16_t address, uint32_t value) { cfg.push(rtl::RegisterWrite{address, value}.word()); }
+  void write(uint16_t address, uint32_t value) { cfg.push(golden::RegisterWrite{address, value}.word()); }
   void command(uint32_t bits) { write(golden::kRegCommand, bits); }
   void write_table(const std::vector<golden::PlaneEntry>& table) {
-    for (const auto& w : rtl::table_writes(table)) write(w.address, w.value);
+    for (const auto& w : golden::table_writes(table)) write(w.address, w.value);
   }
   void write_job(const golden::TileJob& job) {
-    for (const auto& w : rtl::job_writes(job)) write(w.address, w.value);
+    for (const auto& w : golden::job_writes(job)) write(w.address, w.value);
   }
   // Packet of the first `count` pixels (all by default), tlast on the last of them unless `last` is false.
   void send_pixels(const Stimulus& s, size_t count = ~size_t{0}, bool last = true) {
     count = std::min(count, s.left.data.size());
     for (size_t i = 0; i < count; ++i)
-      pix.push(uint64_t{s.right.data[i]} << config_.pix_bits | s.left.data[i], last && i + 1 == count);
+      pix.push(golden::pixel_beat(config_, s.left, s.right, i), last && i + 1 == count);
   }
   void flush_cfg() {
     sim.run_until([&] { return cfg.done(); });
@@ -137,7 +137,8 @@ class EngineBench : public Agent {
     try {
       sim.run_until(done);
     } catch (const Timeout& e) {
-      FAIL(e.what() << ", state " << int(dut.state) << ", errors " << rtl::error_names(dut.errors) << '\n' << report());
+      FAIL(e.what() << ", state " << int(dut.state) << ", errors " << golden::error_names(dut.errors) << '\n'
+                    << report());
     }
   }
   bool ok() const {
@@ -294,8 +295,9 @@ class EngineBench : public Agent {
     }
     if (next_plane_ == t.planes) {
       for (size_t i = 0; i < cells_.size(); ++i)
-        cell_.expect(cell_word(rtl::pack_cell(config_, golden::unload(cells_[i], t.threshold)), i + 1 == cells_.size()),
-                     {tile, -1, static_cast<int>(i) % t.tile_cols, static_cast<int>(i) / t.tile_cols});
+        cell_.expect(
+            cell_word(golden::pack_cell(config_, golden::unload(cells_[i], t.threshold)), i + 1 == cells_.size()),
+            {tile, -1, static_cast<int>(i) % t.tile_cols, static_cast<int>(i) / t.tile_cols});
     }
   }
   static uint64_t cell_word(uint64_t data, bool last) { return data << 1 | uint64_t{last}; }

@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "contract/registers.hpp"
 #include "engine/stimulus.hpp"
 #include "fast/fast.hpp"
 #include "golden/control.hpp"
-#include "rtl/registers.hpp"
 #include "rtl/rtl_engine.hpp"
 #include "support/scoreboard.hpp"
 
@@ -54,7 +54,7 @@ int run(int argc, char** argv) {
   Scoreboard cells("cell");
   size_t winners = 0;
   for (size_t at = 0; at < out.cells.size() && at < model.cells.size(); ++at) {
-    cells.compare(rtl::pack_cell(c.config, out.cells[at]), rtl::pack_cell(c.config, model.cells[at]),
+    cells.compare(golden::pack_cell(c.config, out.cells[at]), golden::pack_cell(c.config, model.cells[at]),
                   {0, -1, static_cast<int>(at) % cols, static_cast<int>(at) / cols}, out.clocks);
     winners += model.cells[at].v > 0;
   }

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "golden/config.hpp"
-#include "golden/storage.hpp"
+#include "contract/config.hpp"
+#include "contract/tile.hpp"
 
 namespace psweep::tb {
 

@@ -20,7 +20,7 @@ Status status(const Bench& b) {
 }
 void check(const Bench& b, unsigned errors, unsigned error_count, unsigned done, unsigned dropped, State state) {
   const Status s = status(b);
-  INFO("errors: " << rtl::error_names(s.errors) << ", expected " << rtl::error_names(errors));
+  INFO("errors: " << golden::error_names(s.errors) << ", expected " << golden::error_names(errors));
   CHECK(s.errors == errors);
   CHECK(s.error_count == error_count);
   CHECK(s.done == done);
@@ -111,7 +111,7 @@ TEST_CASE("errors: planes beyond the written table refuse the tile") {
   Bench bench(config, test_seed());
   StimulusMaker maker(config, test_seed());
   const Stimulus s = maker.make(Texture::kRandom, Geometry::kInside, 5, 5, 4);
-  auto words = rtl::table_writes(s.table);
+  auto words = golden::table_writes(s.table);
   words.resize(words.size() - static_cast<size_t>(missing_words));
   for (const auto& w : words) bench.write(w.address, w.value);
   bench.write_job(s.job);
@@ -228,7 +228,7 @@ TEST_CASE("errors: writes and starts while a tile is in work are refused and cha
   if (state != State::kLoad) p.bench.send_pixels(p.tile);
   p.bench.run_until_state(state);
   const golden::TileJob other = p.maker.any().job;
-  for (const auto& w : rtl::job_writes(other)) p.bench.write(w.address, w.value);
+  for (const auto& w : golden::job_writes(other)) p.bench.write(w.address, w.value);
   p.bench.write(golden::kRegTable, 0);
   p.bench.write(0x0007, 0);  // unknown, but busy comes first
   p.bench.command(golden::kCommandStart);

@@ -3,6 +3,7 @@
 // equal to the model cell by cell and to each other; choice of a configuration; errors; threads.
 #include <mutex>
 
+#include "contract/registers.hpp"
 #include "core/error.hpp"
 #include "engine/configurations.hpp"
 #include "engine/stimulus.hpp"
@@ -10,7 +11,6 @@
 #include "golden/psweep.hpp"
 #include "plan/planner.hpp"
 #include "reference/reference.hpp"
-#include "rtl/registers.hpp"
 #include "scene/scene.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -31,20 +31,20 @@ Image<golden::MapCell> through_rtl(const char* name, const Scene& scene, int til
   Image<golden::MapCell> map = blank_map(scene.rig);
   auto input = [&](int i) {
     const PlacedTile& t = plan.tiles[static_cast<size_t>(i)];
-    return rtl::TileInput{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
-                          cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+    return golden::TileInput{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                             cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
   };
   int done = 0;
   rtl::run_tiles(
       c, plan.table, static_cast<int>(plan.tiles.size()), threads, input, [&](int i, const rtl::TileOutput& out) {
         ++done;
         const PlacedTile& t = plan.tiles[static_cast<size_t>(i)];
-        const rtl::TileInput in = input(i);
+        const golden::TileInput in = input(i);
         const auto model = golden::run_tile(c.config, t.job, plan.table, in.left, in.right);
         CHECK(out.window_errors == 0);
         REQUIRE(out.cells.size() == model.cells.size());
         for (size_t at = 0; at < out.cells.size(); ++at)
-          board.compare(rtl::pack_cell(c.config, out.cells[at]), rtl::pack_cell(c.config, model.cells[at]),
+          board.compare(golden::pack_cell(c.config, out.cells[at]), golden::pack_cell(c.config, model.cells[at]),
                         {i, -1, static_cast<int>(at) % t.job.tile_cols, static_cast<int>(at) / t.job.tile_cols},
                         out.clocks);
         place_cells(t, out.cells, map);
@@ -177,7 +177,7 @@ TEST_CASE("rtl engine: extreme formats, random tiles") {
     const auto model = golden::run_tile(c.config, s.job, s.table, s.left, s.right);
     REQUIRE(out.cells.size() == model.cells.size());
     for (size_t at = 0; at < out.cells.size(); ++at)
-      cells.compare(rtl::pack_cell(c.config, out.cells[at]), rtl::pack_cell(c.config, model.cells[at]),
+      cells.compare(golden::pack_cell(c.config, out.cells[at]), golden::pack_cell(c.config, model.cells[at]),
                     {tile, -1, static_cast<int>(at) % s.job.tile_cols, static_cast<int>(at) / s.job.tile_cols},
                     out.clocks);
     CHECK(out.clocks == golden::engine_clocks(c.config, s.job));
@@ -242,7 +242,7 @@ TEST_CASE("rtl engine: threads change nothing, an exception in a worker comes ou
     rtl::run_tiles(
         c, s.table, 7, threads,
         [&](int) {
-          return rtl::TileInput{s.job, s.left, s.right};
+          return golden::TileInput{s.job, s.left, s.right};
         },
         [&](int i, const rtl::TileOutput& out) {
           ++seen[static_cast<size_t>(i)];
@@ -253,7 +253,7 @@ TEST_CASE("rtl engine: threads change nothing, an exception in a worker comes ou
     CHECK(seen == std::vector<int>(7, 1));
     CHECK(clocks == sum);
   }
-  auto fail = [&](int i) -> rtl::TileInput {
+  auto fail = [&](int i) -> golden::TileInput {
     if (i == 2) throw InputError("tile 2 cannot be read");
     return {s.job, s.left, s.right};
   };

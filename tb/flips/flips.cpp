@@ -24,10 +24,10 @@
 
 #include "Vflips_odd_2.h"
 #include "Vflips_tiny.h"
+#include "contract/registers.hpp"
 #include "engine/stimulus.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
-#include "rtl/registers.hpp"
 #include "rtl/rtl_engine.hpp"
 
 using namespace psweep;
@@ -105,11 +105,11 @@ class UpsetEngine : public Machine {
     upset_ = upset;
     at_ = 0;
     idle_inputs();
-    std::vector<rtl::RegisterWrite> writes;
+    std::vector<golden::RegisterWrite> writes;
     writes.push_back({golden::kRegCommand, golden::kCommandClear});
     if (with_table)
-      for (const auto& w : rtl::table_writes(s.table)) writes.push_back(w);
-    for (const auto& w : rtl::job_writes(s.job)) writes.push_back(w);
+      for (const auto& w : golden::table_writes(s.table)) writes.push_back(w);
+    for (const auto& w : golden::job_writes(s.job)) writes.push_back(w);
     if (refused) writes.push_back({golden::kRegTileCols, 0});
     writes.push_back({golden::kRegCommand, golden::kCommandStart});
     for (const auto& w : writes) write(w);
@@ -121,7 +121,7 @@ class UpsetEngine : public Machine {
       const bool more = sent < count;
       dut_->s_pix_tvalid = more;
       if (more) {
-        const unsigned beat = unsigned{s.right.data[sent]} << config_.pix_bits | unsigned{s.left.data[sent]};
+        const unsigned beat = golden::pixel_beat(config_, s.left, s.right, sent);
         dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
         dut_->s_pix_tlast = sent + 1 == count;
       }
@@ -153,7 +153,7 @@ class UpsetEngine : public Machine {
     dut_->s_pix_tvalid = 0;
     dut_->m_map_tready = 1;
   }
-  void write(const rtl::RegisterWrite& w) {
+  void write(const golden::RegisterWrite& w) {
     dut_->s_cfg_tvalid = 1;
     dut_->s_cfg_tdata = w.word();
     collect();
@@ -222,7 +222,7 @@ class Campaign {
     const auto model = golden::run_tile(config, tile_.job, tile_.table, tile_.left, tile_.right).cells;
     sound_ = right_.cells.size() == model.size() && right_.last_right && !right_.hang && right_.errors == 0;
     for (size_t i = 0; i < model.size() && sound_; ++i)
-      sound_ = right_.cells[i] >> 1 == rtl::pack_cell(config, model[i]);
+      sound_ = right_.cells[i] >> 1 == golden::pack_cell(config, model[i]);
   }
 
   // Every bit of every register, in several clocks of every state; of RAMs some words in some clocks.

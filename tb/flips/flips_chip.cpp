@@ -25,10 +25,10 @@
 
 #include "Vflips_chip.h"
 #include "Vflips_chip__Syms.h"
+#include "contract/frames.hpp"
+#include "contract/registers.hpp"
 #include "engine/stimulus.hpp"
 #include "golden/psweep.hpp"
-#include "golden/registers.hpp"
-#include "net/frames.hpp"
 #include "net/link_engine.hpp"
 
 using namespace psweep;
@@ -624,7 +624,7 @@ class Campaign {
     for (const auto& w : golden::table_writes(a.table)) net::append32(work_.table, w.value);
     for (const Stimulus* s : {&a, &b}) {
       Tile tile;
-      const net::LinkTile pixels{s->job, s->left, s->right};
+      const golden::TileInput pixels{s->job, s->left, s->right};
       tile.start = net::start_payload(work_.config, s->job, 1);
       tile.rows = net::row_chunks(work_.config, pixels);
       const auto cells = golden::run_tile(c, s->job, s->table, s->left, s->right).cells;

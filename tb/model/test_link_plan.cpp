@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.hpp"
+#include "golden/control.hpp"
 #include "plan/link_plan.hpp"
 #include "plan/planner.hpp"
 #include "scene/scene.hpp"

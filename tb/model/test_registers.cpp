@@ -6,8 +6,8 @@
 #include <sstream>
 #include <string>
 
+#include "contract/registers.hpp"
 #include "golden/psweep.hpp"
-#include "golden/registers.hpp"
 #include "plan/planner.hpp"
 #include "support/catch.hpp"
 

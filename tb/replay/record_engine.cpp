@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "engine/engine_bench.hpp"
+#include "golden/control.hpp"
 #include "replay/recorded_psweep.hpp"
 
 using namespace psweep;

@@ -8,7 +8,7 @@
 #include <atomic>
 #include <string>
 
-#include "rtl/registers.hpp"
+#include "contract/registers.hpp"
 #include "rtl/rtl_engine.hpp"
 #include "support/coverage.hpp"
 
@@ -57,10 +57,10 @@ class VerilatedEngine : public EngineModel {
     try {
       write({golden::kRegCommand, golden::kCommandClear});
       if (!table_written_) {
-        for (const auto& w : table_writes(table_)) write(w);
+        for (const auto& w : golden::table_writes(table_)) write(w);
         table_written_ = true;
       }
-      for (const auto& w : job_writes(job)) write(w);
+      for (const auto& w : golden::job_writes(job)) write(w);
       write({golden::kRegCommand, golden::kCommandStart});
       TileOutput out;
       out.cells.reserve(size_t(job.tile_cols) * job.tile_rows);
@@ -72,7 +72,7 @@ class VerilatedEngine : public EngineModel {
       out.window_errors = dut_->window_errors;
       publish();
       if (out.errors & ~unsigned{golden::kErrorWindow} || out.cells.size() != size_t(job.tile_cols) * job.tile_rows)
-        throw EngineError("rtl engine: tile failed, errors: " + error_names(out.errors) + "; " +
+        throw EngineError("rtl engine: tile failed, errors: " + golden::error_names(out.errors) + "; " +
                           std::to_string(out.cells.size()) + " of " +
                           std::to_string(size_t(job.tile_cols) * job.tile_rows) + " cells came out");
       return out;
@@ -116,9 +116,9 @@ class VerilatedEngine : public EngineModel {
   void check_deadline() const {
     if (clock_ > deadline_)
       throw EngineError("rtl engine: hangs in state " + std::to_string(int(dut_->state)) +
-                        ", errors: " + error_names(dut_->errors));
+                        ", errors: " + golden::error_names(dut_->errors));
   }
-  void write(const RegisterWrite& w) {
+  void write(const golden::RegisterWrite& w) {
     dut_->s_cfg_tvalid = 1;
     dut_->s_cfg_tdata = w.word();
     low();  // tready is always 1
@@ -130,7 +130,7 @@ class VerilatedEngine : public EngineModel {
     const size_t count = size_t(job.win_cols) * job.win_rows;
     dut_->s_pix_tvalid = 1;
     for (size_t i = 0; i < count;) {
-      const unsigned beat = unsigned{right.data[i]} << config_.pix_bits | unsigned{left.data[i]};
+      const unsigned beat = golden::pixel_beat(config_, left, right, i);
       dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
       dut_->s_pix_tlast = i + 1 == count;
       low();
@@ -157,7 +157,7 @@ class VerilatedEngine : public EngineModel {
     }
   }
   void collect(TileOutput& out) {
-    if (dut_->m_map_tvalid) out.cells.push_back(unpack_cell(config_, dut_->m_map_tdata));
+    if (dut_->m_map_tvalid) out.cells.push_back(golden::unpack_cell(config_, dut_->m_map_tdata));
   }
 
   golden::Config config_;

@@ -63,7 +63,7 @@ TileOutput RtlEngine::run(const golden::TileJob& job, const golden::Pixels& left
 void RtlEngine::count_clocks_in(std::atomic<uint64_t>* counter) { model_->count_clocks_in(counter); }
 
 void run_tiles(const Configuration& configuration, const std::vector<golden::PlaneEntry>& table, int count, int threads,
-               const std::function<TileInput(int)>& input, const std::function<void(int, TileOutput)>& output,
+               const std::function<golden::TileInput(int)>& input, const std::function<void(int, TileOutput)>& output,
                std::atomic<uint64_t>* clock_counter) {
   if (threads <= 0) threads = std::max(1u, std::thread::hardware_concurrency());
   threads = std::min(threads, count);
@@ -78,7 +78,7 @@ void run_tiles(const Configuration& configuration, const std::vector<golden::Pla
       std::unique_lock<std::mutex> lock(mutex);
       while (next < count && !failure) {
         const int tile = next++;
-        const TileInput in = input(tile);
+        const golden::TileInput in = input(tile);
         lock.unlock();
         TileOutput out = engine.run(in.job, in.left, in.right);
         lock.lock();

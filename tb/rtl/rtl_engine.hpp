@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "golden/config.hpp"
-#include "golden/storage.hpp"
+#include "contract/config.hpp"
+#include "contract/tile.hpp"
 
 namespace psweep::rtl {
 
@@ -45,11 +45,6 @@ std::string build_command(const golden::Config& need);
 class EngineError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
-};
-
-struct TileInput {
-  golden::TileJob job;
-  golden::Pixels left, right;  // win_cols x win_rows
 };
 
 struct TileOutput {
@@ -86,7 +81,7 @@ class RtlEngine {
 // Runs tiles 0 .. count-1 on `threads` engines (0: one per core). `input` and `output` are called from the worker
 // threads, never two at a time, in no particular order. The first exception stops all workers and is thrown again here.
 void run_tiles(const Configuration& configuration, const std::vector<golden::PlaneEntry>& table, int count, int threads,
-               const std::function<TileInput(int)>& input, const std::function<void(int, TileOutput)>& output,
+               const std::function<golden::TileInput(int)>& input, const std::function<void(int, TileOutput)>& output,
                std::atomic<uint64_t>* clock_counter = nullptr);
 
 }  // namespace psweep::rtl

@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "engine/engine_bench.hpp"
+#include "golden/control.hpp"
 #include "replay/recorded_psweep.hpp"
 
 using namespace psweep;
@@ -195,7 +196,7 @@ class Session {
   void missing_table() {
     const Stimulus s = make();
     what_ = "table too short, " + s.name;
-    auto words = rtl::table_writes(s.table);
+    auto words = golden::table_writes(s.table);
     words.pop_back();
     for (const auto& w : words) bench_.write(w.address, w.value);
     bench_.write_job(s.job);
@@ -263,7 +264,7 @@ class Session {
   }
   void check_status() {
     const auto& d = bench_.dut;
-    INFO("errors: " << rtl::error_names(d.errors) << ", expected " << rtl::error_names(expected_.errors));
+    INFO("errors: " << golden::error_names(d.errors) << ", expected " << golden::error_names(expected_.errors));
     REQUIRE(d.errors == expected_.errors);
     REQUIRE(d.error_count == expected_.error_count);
     REQUIRE(d.tiles_done == expected_.done);

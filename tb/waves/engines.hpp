@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "contract/config.hpp"
 #include "engine/stimulus.hpp"
-#include "golden/config.hpp"
 
 namespace psweep::waves {
 

@@ -8,8 +8,8 @@
 
 #include <memory>
 
+#include "contract/registers.hpp"
 #include "golden/control.hpp"
-#include "golden/registers.hpp"
 #include "waves/engines.hpp"
 #include "waves/fst.hpp"
 
@@ -50,7 +50,7 @@ class TracedEngine {
     const size_t count = s.left.data.size();
     dut_->s_pix_tvalid = 1;
     for (size_t i = 0; i < count && clock_ < deadline;) {
-      const unsigned beat = unsigned{s.right.data[i]} << config_.pix_bits | unsigned{s.left.data[i]};
+      const unsigned beat = golden::pixel_beat(config_, s.left, s.right, i);
       dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
       dut_->s_pix_tlast = i + 1 == count;
       i += tick();

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "net/protocol.hpp"
+#include "contract/protocol.hpp"
 
 namespace psweep::net {
 

@@ -1,19 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
-// Words on the streams of entity psweep (docs/interfaces.md): register writes of a tile and of the plane table, map
-// cells, names of the error bits. Addresses and bits themselves: golden/control.hpp.
+// What entity psweep says and understands (docs/interfaces.md, docs/registers.md): addresses of its registers, states,
+// error bits, and the words on its streams: register writes of a tile and of the plane table, pixels, map cells.
 #pragma once
 #include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "golden/control.hpp"
+#include "contract/config.hpp"
+#include "contract/tile.hpp"
 
 namespace psweep::golden {
 
+// Registers: address of a write on s_cfg. Plane table: kRegTable + 8 * plane + field.
+enum Register : uint16_t {
+  kRegCommand = 0x00,
+  kRegTileCols = 0x01,
+  kRegTileRows = 0x02,
+  kRegWinCols = 0x03,
+  kRegWinRows = 0x04,
+  kRegPlanes = 0x05,
+  kRegThreshold = 0x06,
+  kRegTx = 0x08,     // left x, left y, right x, right y
+  kRegLeft = 0x10,   // x_lo, x_hi, y_lo, y_hi
+  kRegRight = 0x14,  // x_lo, x_hi, y_lo, y_hi
+  kRegTable = 0x8000,
+};
+enum CommandBit : uint32_t { kCommandStart = 1 << 0, kCommandAbort = 1 << 1, kCommandClear = 1 << 2 };
+
+enum class State { kIdle = 0, kLoad = 1, kSweep = 2, kFlush = 3, kUnload = 4, kDrain = 5 };
+
+// Port errors.
+enum ErrorBit : uint8_t {
+  kErrorConfig = 1 << 0,   // a size register out of range (or never written) at start
+  kErrorTable = 1 << 1,    // more planes than written to the table
+  kErrorShort = 1 << 2,    // tlast before the last pixel
+  kErrorLong = 1 << 3,     // no tlast on the last pixel
+  kErrorWindow = 1 << 4,   // a sample inside both images is not loaded
+  kErrorAddress = 1 << 5,  // unknown register, or a table word out of order or range
+  kErrorBusy = 1 << 6,     // write or start while a tile is in work
+  kErrorUpset = 1 << 7,    // RTL alone: a state or an end of the map that cannot be; the tile is dropped
+};
+
 struct RegisterWrite {
-  uint16_t address;
-  uint32_t value;
+  uint16_t address = 0;
+  uint32_t value = 0;
   uint64_t word() const { return uint64_t{address} << 32 | value; }  // s_cfg_tdata
 };
 
@@ -53,6 +84,13 @@ inline std::vector<RegisterWrite> table_writes(const std::vector<PlaneEntry>& ta
     for (size_t f = 0; f < 8; ++f) w.push_back({static_cast<uint16_t>(kRegTable + 8 * k + f), fields[f]});
   }
   return w;
+}
+
+// s_pix_tdata = {right, left}
+inline uint32_t pixel_beat(const Config& c, unsigned left, unsigned right) { return right << c.pix_bits | left; }
+// Pixel i of both windows, raster order.
+inline uint32_t pixel_beat(const Config& c, const Pixels& left, const Pixels& right, size_t i) {
+  return pixel_beat(c, left.data[i], right.data[i]);
 }
 
 // m_map_tdata = {mask(3:0), plane, frac, v}

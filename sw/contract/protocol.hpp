@@ -7,8 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "golden/config.hpp"
-#include "golden/control.hpp"
+#include "contract/config.hpp"
 
 namespace psweep::net {
 
@@ -233,6 +232,11 @@ inline std::optional<Header> decode(const Bytes& b) {
   h.tile = static_cast<uint16_t>(get16(b, 12));
   h.index = static_cast<uint16_t>(get16(b, 14));
   return h;
+}
+
+// Pair of pixels on the wire: left in the upper bits.
+inline uint32_t pack_wire_pair(const golden::Config& c, unsigned left, unsigned right) {
+  return left << c.pix_bits | right;
 }
 
 // Map cell on the wire: the mask bits but "not local" follow from the others.
