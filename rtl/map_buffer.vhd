@@ -17,7 +17,7 @@
 --   fail     : the launched tile has failed in the engine: an incomplete map is forgotten; a chunk that is being sent
 --              continues to its end
 --   Upsets   : the states of either side differ in two bits; any other code acts as clear and sets recovered for one
---              clock. The map is then lost, and a reader that waits for bytes waits in vain
+--              clock. The map is then lost, and a reader that waits for bytes never gets them
 --   Golden   : sw/golden/map_buffer.hpp
 library ieee;
   use ieee.std_logic_1164.all;

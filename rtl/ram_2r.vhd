@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- ram_2r: true dual-port RAM with one clock: port a writes or reads, port b reads. Two lanes share one: while a tile is
---         swept nobody writes, so both ports of a block RAM are free to read.
+--         swept nothing is written, so both ports of a block RAM are free to read.
 --   Rate      : a: one write or read per clock; b: one read per clock
 --   Latency   : 2 clocks from a_addr to a_rdata and from b_addr to b_rdata (with the output registers of the blocks)
 --   Parts     : as ram_deep with latency 2: the selection lies behind these registers

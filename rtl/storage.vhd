@@ -3,7 +3,7 @@
 --          any 2x2 neighbourhood is read in one clock (paper, section 4.2.1, equation 2).
 --   Rate     : one sample (2x2 pixels of each image) per lane and clock; writes: one pixel of each image per clock
 --   Latency  : C_STORAGE_LATENCY = 4 clocks from s_* to m_*
---   Lanes    : vectors hold lane 0 in the low bits. A block RAM has two ports, and nobody writes while a tile is swept:
+--   Lanes    : vectors hold lane 0 in the low bits. A block RAM has two ports, and nothing is written in a sweep:
 --              lanes 0 and 1 read the same banks, each through its own port, any sample at any time (ram_2r). Lanes 2
 --              and 3 have a second copy. So two lanes need no more RAM than one, and no lane depends on where another
 --              reads
