@@ -456,7 +456,7 @@ def table_arbiter(base):
     return markdown(["entity, generics as by default", *COUNTS], rows)
 
 
-TABLES = {"units": table_units, "families": table_families, "levels": table_levels,
+TABLES = {"units": table_units, "families": table_families,
           "nx": table_nx, "pnr": table_pnr, "changes": table_changes,
           "headline": table_headline, "decisions": table_decisions, "rectified": table_rectified,
           "division": table_division, "arbiter": table_arbiter}
@@ -464,7 +464,7 @@ TABLES = {"units": table_units, "families": table_families, "levels": table_leve
 COMPLETE = {"Targets": table_targets, "Engines and entities": table_engines, "Cost of each bit": table_bits,
             "Beside the paper's table 5 (PDS: pixels x disparities a second, at 300 MHz)": table_five,
             "Cells of each unit": table_cells, "All families": lambda base: table_families(base, True),
-            "Longest paths": table_paths, "Placed and routed": table_pnr_full,
+            "Longest paths by unit": table_levels, "Longest paths": table_paths, "Placed and routed": table_pnr_full,
             "NG-MEDIUM: every memory": table_nx_rams}
 
 
