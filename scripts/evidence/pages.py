@@ -40,8 +40,7 @@ def origin(status: Status) -> str:
         return "never measured"
     stamp = status.record.stamp
     at = f"commit {stamp.commit}" + (" with changes of its own" if stamp.edited else "")
-    where = f" ({stamp.date}{', ' + stamp.machine if stamp.machine else ''})"
-    return f"{at}{where}{'' if stamp.passed else ', with failures'}{since(status)}"
+    return f"{at} ({stamp.date}){'' if stamp.passed else ', with failures'}{since(status)}"
 
 
 def generate(block: str, status: dict[str, Status]) -> str:
