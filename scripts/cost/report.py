@@ -417,7 +417,7 @@ COUNTS = ["LUT", "FF", "RAMB36", "DSP"]
 
 
 def table_decisions(base):
-    """docs/architecture.md: what was not decided for; the rest is in 'headline'."""
+    """Alternatives of docs/architecture.md, and units beside the paper's."""
     def times(number, title):
         c = flat(base, "tile")["counts"]
         return [title, *(num(number * c[k]) for k in ("lut", "ff", "ram36_equivalent", "dsp")), ""]
@@ -454,21 +454,21 @@ def table_arbiter(base):
 
 
 TABLES = {"units": table_units, "families": table_families,
-          "nx": table_nx, "pnr": table_pnr, "changes": table_changes,
-          "headline": table_headline, "decisions": table_decisions, "rectified": table_rectified,
+          "pnr": table_pnr, "changes": table_changes,
+          "headline": table_headline, "rectified": table_rectified,
           "division": table_division, "arbiter": table_arbiter}
 # Too long for the pages: --full.
 COMPLETE = {"Targets": table_targets, "Engines and entities": table_engines, "Cost of each bit": table_bits,
             "Beside the paper's table 5 (PDS: pixels x disparities a second, at 300 MHz)": table_five,
             "Cells of each unit": table_cells, "All families": lambda base: table_families(base, True),
             "Longest paths by unit": table_levels, "Longest paths": table_paths, "Placed and routed": table_pnr_full,
-            "NG-MEDIUM: every memory": table_nx_rams}
+            "What was decided against": table_decisions,
+            "NG-MEDIUM: memories by unit": table_nx, "NG-MEDIUM: every memory": table_nx_rams}
 
 
 def full(base):
     """The complete tables as one page."""
-    parts = ["# Complete tables of cost", "Written from `scripts/cost/baseline.json`. [Cost](../cost.md) shows them in "
-             "short."]
+    parts = ["# Complete tables of cost", "Written from `scripts/cost/baseline.json`."]
     for title, make in COMPLETE.items():
         parts += [f"## {title}", make(base)]
     return "\n\n".join(parts) + "\n"

@@ -72,11 +72,11 @@ def navigation() -> list[dict[str, object]]:
             pages = [name for name in re.findall(r"\]\(([\w/]+\.md)\)", row[1]) if name not in seen]
             seen.update(pages)
             if pages:
-                entries.append({row[0]: [f"docs/{name}" for name in pages]})
+                entries.append({row[0][0].upper() + row[0][1:]: [f"docs/{name}" for name in pages]})
         parts.append({title: entries})
     last = list(parts[-1].values())[0]
     assert isinstance(last, list)
-    last.append({"complete tables": [{title: page} for title, (_, _, page) in COMPLETE.items()]})
+    last.append({"Complete tables": [{title: page} for title, (_, _, page) in COMPLETE.items()]})
     parts.append({"Folders": ["docs/README.md", *OTHERS]})
     return parts
 

@@ -255,7 +255,7 @@ def rules(r: dict[str, Any]) -> str:
         "each stopped by its rule." if not r["failed"] else f"{r['failed']} more NOT stopped by their rules."))
 
 
-@simple("gates")
+@complete("gates", "gates", "Gate level")
 def gates(r: dict[str, Any]) -> str:
     groups = (("LUT", r"LUT\d"), ("FDRE, FDSE", "FD[RS]E"), ("RAMB18", "RAMB18.*"), ("RAMB36", "RAMB36.*"),
               ("DSP48E1", "DSP48E1"))
@@ -272,7 +272,7 @@ _BROKEN = {"LUT6": "INIT inverted", "FDRE": "D inverted", "CARRY4": "S inverted"
            "DSP48E1": "subtracts", "RAMB36E1": "write enables 0"}
 
 
-@simple("gates.faults", "gates")
+@complete("gates.faults", "gates", "Gate level: broken cells")
 def gates_faults(r: dict[str, Any]) -> str:
     rows = []
     for cell, text in r["faults"].items():
@@ -346,8 +346,10 @@ def _printed(name: str, kind: str, number: int, without: tuple[str, ...] = ()) -
 
 for _name, _number in (("full", 0), ("half", 1), ("rings", 2), ("lanes", 3)):
     _printed(f"link-table.{_name}", "link-table", _number, ("bands",))
-for _name, _number in (("tiles", 0), ("bands", 1), ("losses", 2)):
-    _printed(f"shape-table.{_name}", "shape-table", _number, ("tiles", "of them map", "10", "40"))
+for _name, _number in (("tiles", 0), ("losses", 2)):
+    _printed(f"shape-table.{_name}", "shape-table", _number, ("tiles", "of them map"))
+complete("shape-table.bands", "shape-table", "shape-table, bands")(
+    lambda r: table(r["tables"][1][0], r["tables"][1][1:]))
 
 
 # ---- coverage
@@ -357,20 +359,20 @@ def _share(found: list[int]) -> str:
 
 
 def _coverage(r: dict[str, Any], head: list[str], below: float) -> str:
-    """Entities with a share below this, the others in one row, and all."""
-    low = {name: n for name, n in r["rows"].items() if 100 * n[0] / n[1] < below}
-    rest = [n for name, n in r["rows"].items() if name not in low]
-    others = [sum(column) for column in zip(*rest)]
-    rows = [[f"`{name}`", n[1], n[0], _share(n)] for name, n in low.items()]
-    if rest:
-        rows.append([f"the other {len(rest)}", others[1], others[0], _share(others)])
+    """Entities with a share below this, and all."""
+    rows = [[f"`{name}`", n[1], n[0], _share(n)] for name, n in r["rows"].items() if 100 * n[0] / n[1] < below]
     return table(head, [*rows, ["all", r["all"][1], r["all"][0], _share(r["all"])]])
+
+
+def _coverage_text(r: dict[str, Any], what: str, below: float) -> str:
+    low = [f"`{name}` {_share(n)}" for name, n in r["rows"].items() if 100 * n[0] / n[1] < below]
+    return wrapped(f"{_share(r['all'])} % of {r['all'][1]:,} {what}; below {below:g} %: {', '.join(low) or 'none'}.")
 
 
 _LINES = ["entity", "lines", "run", "%"]
 _TOGGLES = ["entity", "bits", "changed both ways", "%"]
-simple("coverage-lines")(lambda r: _coverage(r, _LINES, 100))
-simple("coverage-toggles")(lambda r: _coverage(r, _TOGGLES, 90))
+simple("coverage-lines")(lambda r: _coverage_text(r, "lines run", 100))
+simple("coverage-toggles")(lambda r: _coverage_text(r, "bits changed both ways", 92))
 complete("coverage-lines", "coverage-lines", "Lines by entity")(lambda r: _coverage(r, _LINES, 101))
 complete("coverage-toggles", "coverage-toggles", "Toggled bits by entity")(lambda r: _coverage(r, _TOGGLES, 101))
 
@@ -424,8 +426,9 @@ def accuracy_mean(r: dict[str, Any]) -> str:
 
 @simple("accuracy.unseen", "accuracy")
 def accuracy_unseen(r: dict[str, Any]) -> str:
-    return table(_MEAN[:-1], [row[:-1] for row in _mean_rows(r["unseen"], (_FIXED, f"{_FIXED} + both"))
-                              if row[1] != "the paper"])
+    rows = [row for row in _mean_rows(r["unseen"], (f"{_FIXED} + both",)) if row[1] != "the paper"]
+    return wrapped("; ".join(f"{row[0]}: " + ", ".join(f"{title} {cell}" for title, cell in zip(_MEAN[2:], row[2:-1]))
+                             for row in rows) + ".")
 
 
 for _name, _title in (("scenes", "Every scene"), ("unseen", "Scenes with seeds that nobody looked at"),
@@ -453,7 +456,7 @@ def accuracy_datasheet(r: dict[str, Any]) -> str:
 
 # ---- this machine
 
-@simple("fresh-machine")
+@complete("fresh-machine", "fresh-machine", "Bare machines")
 def fresh_machine(r: dict[str, Any]) -> str:
     names = {"bookworm": "Debian 12", "trixie": "Debian 13"}
     return table(["bare root", "command", "seconds", "exit code"],
