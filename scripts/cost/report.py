@@ -13,8 +13,25 @@
   scripts/cost/report.py --full [FILE]       the complete tables as one page: build/cost/full.md
   scripts/cost/report.py --pnr               place and route into baseline.json and the pages (half an hour)
 
-Everything is written to build/cost/ as JSON (fields: docs/cost.md), with the plot cost.svg. JOBS: measurements at once.
-COST_PROGRAMS: folder of shape_table and link_table (default build).
+Everything is written to build/cost/ as JSON, with the plot cost.svg. JOBS: measurements at once. COST_PROGRAMS: folder
+of shape_table and link_table (default build).
+
+Fields of the JSON, which scripts/cost/measure.py --json writes, too:
+  schema            1
+  entity, unit, family, generics, hierarchy, no_dsp
+                    the question; generics with those by default
+  tool              Yosys and its version
+  counts            lut, ff, ram36, ram18, ram36_equivalent, ram48 (NX_RAM as Yosys maps), rf, dsp, alu, carry, mux,
+                    srl, lutram (cells)
+  cells             primitives by name
+  memories          unit, path, words, bits, reads, writes; nx_ram48, nx_ram48_ecc: blocks of NG-MEDIUM by modes
+  memory_bits       sum of words x bits
+  products          unit; bits of both operands and of the result; signed
+  levels            longest (lut, carry, start, end), by_unit (unit of the end), histogram (LUTs: ends); flat, not ecp5
+  units             with --hierarchy: counts, cells, instances, longest path of each; "" is what lies between them
+  registers_merged  FF that became a block's own
+  signed_products_repaired, seconds, cached
+                    of this run
 """
 import argparse
 import json

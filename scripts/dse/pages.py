@@ -124,7 +124,7 @@ def accuracy_short(tables):
 
 
 TABLES = {"resources": resources, "pareto": pareto, "clocks": clocks, "accuracy": accuracy}
-IN_PAGE = {"pareto": pareto, "accuracy": accuracy_short}
+IN_PAGE = {"accuracy": accuracy_short}
 
 
 def markdown(head, rows):
