@@ -197,6 +197,11 @@ format: ## Lay out the C++ with clang-format
 	@scripts/setup.sh lint
 	@scripts/lint.sh --format
 
+.PHONY: docs
+docs: ## The pages as a site with search, links checked: build/docs/index.html
+	@scripts/setup.sh docs
+	@scripts/docs/site.py
+
 .PHONY: fresh-machine
 fresh-machine: ## README's commands in a bare Debian root   SUITE=bookworm|trixie (root only)
 	@scripts/fresh_machine.sh $(or $(SUITE),bookworm)
