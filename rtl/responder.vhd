@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- responder: what the chip does with a message: ARP and ICMP echo replies, the session, and the protocol over UDP.
---   Protocol  : docs/protocol.md, sw/net/protocol.hpp
+--   Protocol  : docs/protocol.md, sw/contract/protocol.hpp
 --   Structure : one message at a time, bytes in order, no CPU. The waiting frame is read from packet_rx's RAM byte by
 --               byte through one 32-bit shift register (word): first the header (bytes 42 to 57), then the arguments.
 --               Rows go on to the row buffer as they pass, one byte a clock. The reply is made byte by byte: its

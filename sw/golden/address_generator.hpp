@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bit-true model of entity address_generator (paper, section 4.2): where each sample of a plane lies in both images.
 #pragma once
-#include "golden/config.hpp"
+#include "contract/config.hpp"
 
 namespace psweep::golden {
 

@@ -8,7 +8,7 @@
 #include <initializer_list>
 #include <optional>
 
-#include "net/frames.hpp"
+#include "contract/frames.hpp"
 
 namespace psweep::golden {
 

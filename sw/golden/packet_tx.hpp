@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bit-true model of entity packet_tx: kind, addresses and payload -> the frame in the slot, without padding and FCS.
-// Written byte by byte from RFC 826 (ARP), 791 (IPv4), 792 (ICMP), 768 (UDP), and not with net/frames.hpp: that one is
-// the second opinion.
+// Written byte by byte from RFC 826 (ARP), 791 (IPv4), 792 (ICMP), 768 (UDP), and not with contract/frames.hpp: that
+// one is the second opinion.
 #pragma once
 #include <cstdint>
 

@@ -6,15 +6,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "net/protocol.hpp"
+#include "contract/protocol.hpp"
+#include "contract/registers.hpp"
 
 namespace psweep::golden {
-
-struct RegisterWrite {
-  uint16_t address = 0;
-  uint32_t value = 0;
-  uint64_t word() const { return uint64_t{address} << 32 | value; }  // s_cfg_tdata
-};
 
 class Scheduler {
  public:

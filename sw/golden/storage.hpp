@@ -2,12 +2,10 @@
 // Bit-true model of entity storage (paper, section 4.2.1, equation 2): the loaded window of one image in four banks
 // interleaved by the parities of x and y, so that any 2x2 neighbourhood is read in one clock.
 #pragma once
-#include "core/image.hpp"
+#include "contract/tile.hpp"
 #include "golden/address_generator.hpp"
 
 namespace psweep::golden {
-
-using Pixels = Image<uint16_t>;  // pix_bits each
 
 // The 2x2 neighbourhood of a sample: p10 is the right neighbour of p00, p01 the one below.
 struct Quad {

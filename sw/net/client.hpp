@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "net/protocol.hpp"
+#include "contract/protocol.hpp"
 #include "net/transport.hpp"
 
 namespace psweep::net {

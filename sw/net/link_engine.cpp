@@ -7,7 +7,8 @@
 #include <map>
 #include <optional>
 
-#include "golden/registers.hpp"
+#include "contract/registers.hpp"
+#include "golden/control.hpp"
 
 namespace psweep::net {
 namespace {
@@ -27,7 +28,7 @@ constexpr int kMostTries = 3;           // of one tile
 class Pump {
  public:
   Pump(Client& client, const Capabilities& chip, const std::vector<golden::PlaneEntry>& table, int count,
-       const LinkOptions& options, const std::function<LinkTile(int)>& input,
+       const LinkOptions& options, const std::function<golden::TileInput(int)>& input,
        const std::function<void(int, std::vector<golden::MapCell>)>& output,
        const std::function<void(uint64_t)>& progress)
       : client_(client),
@@ -190,7 +191,7 @@ class Pump {
 
   void prepare() {
     if (upload_active_ && !upload_.started) return;  // refused for now; its rows are ready
-    const LinkTile tile = input_(next_);
+    const golden::TileInput tile = input_(next_);
     upload_ = Upload{};
     upload_.number = number(next_);
     upload_.rows = row_chunks(c_, tile);
@@ -551,7 +552,7 @@ class Pump {
   const std::vector<golden::PlaneEntry>& table_;
   const int count_;
   const LinkOptions options_;
-  const std::function<LinkTile(int)>& input_;
+  const std::function<golden::TileInput(int)>& input_;
   const std::function<void(int, std::vector<golden::MapCell>)>& output_;
   const std::function<void(uint64_t)>& progress_;
   LinkFigures figures_;
@@ -605,14 +606,14 @@ Bytes start_payload(const ArbiterConfig& c, const golden::TileJob& job, uint16_t
   return b;
 }
 
-std::vector<Bytes> row_chunks(const ArbiterConfig& c, const LinkTile& tile) {
+std::vector<Bytes> row_chunks(const ArbiterConfig& c, const golden::TileInput& tile) {
   const size_t pairs = tile.left.data.size(), per = c.chunk_pairs(), width = c.pair_bytes();
   std::vector<Bytes> chunks((pairs + per - 1) / per);
   for (size_t i = 0; i < chunks.size(); ++i) {
     Bytes& b = chunks[i];
     b.assign(per * width, 0);  // the last one is filled up
     for (size_t k = 0; k < per && i * per + k < pairs; ++k) {
-      const uint32_t pair = uint32_t{tile.left.data[i * per + k]} << c.engine.pix_bits | tile.right.data[i * per + k];
+      const uint32_t pair = pack_wire_pair(c.engine, tile.left.data[i * per + k], tile.right.data[i * per + k]);
       for (size_t byte = 0; byte < width; ++byte)
         b[k * width + byte] = static_cast<uint8_t>(pair >> 8 * (width - 1 - byte));
     }
@@ -667,7 +668,7 @@ bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
 }
 
 LinkFigures run_link_tiles(Client& client, const Capabilities& chip, const std::vector<golden::PlaneEntry>& table,
-                           int count, const LinkOptions& options, const std::function<LinkTile(int)>& input,
+                           int count, const LinkOptions& options, const std::function<golden::TileInput(int)>& input,
                            const std::function<void(int, std::vector<golden::MapCell>)>& output,
                            const std::function<void(uint64_t cells)>& progress) {
   try {

@@ -10,15 +10,10 @@
 #include <functional>
 #include <vector>
 
-#include "golden/storage.hpp"
+#include "contract/tile.hpp"
 #include "net/client.hpp"
 
 namespace psweep::net {
-
-struct LinkTile {
-  golden::TileJob job;
-  golden::Pixels left, right;  // win_cols x win_rows
-};
 
 struct LinkOptions {
   int in_flight = 2;  // 1: the next tile is sent after the map of this one; 2: as soon as the chip takes it
@@ -40,7 +35,7 @@ struct LinkFigures {
 
 // Payloads. Exposed for tests and the link's benchmark.
 Bytes start_payload(const ArbiterConfig& c, const golden::TileJob& job, uint16_t table);
-std::vector<Bytes> row_chunks(const ArbiterConfig& c, const LinkTile& tile);
+std::vector<Bytes> row_chunks(const ArbiterConfig& c, const golden::TileInput& tile);
 Bytes read_payload(uint16_t count, uint16_t keep);
 // One chunk of cells; false if a cell cannot come from this tile.
 bool decode_cells(const ArbiterConfig& c, const golden::TileJob& job, const Bytes& bytes, size_t first,
@@ -51,7 +46,7 @@ bool write_table(Client& client, const ArbiterConfig& c, const std::vector<golde
 // Tiles 0 .. count-1. `input` is called in order, once for each tile and again for those that have to be repeated;
 // `output` once for each, in order; `progress` with cells received. The session is opened and closed here.
 LinkFigures run_link_tiles(Client& client, const Capabilities& chip, const std::vector<golden::PlaneEntry>& table,
-                           int count, const LinkOptions& options, const std::function<LinkTile(int)>& input,
+                           int count, const LinkOptions& options, const std::function<golden::TileInput(int)>& input,
                            const std::function<void(int, std::vector<golden::MapCell>)>& output,
                            const std::function<void(uint64_t cells)>& progress);
 

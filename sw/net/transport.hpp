@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "net/protocol.hpp"
+#include "contract/protocol.hpp"
 
 namespace psweep::net {
 

@@ -9,11 +9,11 @@
 #pragma once
 #include <vector>
 
+#include "contract/config.hpp"
+#include "contract/tile.hpp"
 #include "core/planes.hpp"
 #include "core/result.hpp"
 #include "core/rig.hpp"
-#include "golden/config.hpp"
-#include "golden/storage.hpp"
 
 namespace psweep {
 

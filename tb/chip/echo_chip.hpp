@@ -7,8 +7,8 @@
 #include <optional>
 #include <random>
 
-#include "chip/chip_model.hpp"
-#include "net/frames.hpp"
+#include "contract/frames.hpp"
+#include "desk/chip_model.hpp"
 
 namespace psweep::chip {
 

@@ -16,10 +16,12 @@
 #include "chip/goodput.hpp"
 #include "chip/watched.hpp"
 #include "fast/fast.hpp"
+#include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "net/link_engine.hpp"
 #include "plan/planner.hpp"
 #include "scene/scene.hpp"
+#include "verilated/chips.hpp"
 
 namespace psweep::chip {
 namespace {
@@ -63,8 +65,8 @@ bool measure(const SweepSetup& setup, const Scene& scene, const Plan& plan, int 
   options.in_flight = in_flight;
   auto input = [&](int i) {
     const PlacedTile& t = plan.tiles[static_cast<size_t>(i)];
-    return net::LinkTile{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
-                         cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
+    return golden::TileInput{t.job, cut_window(scene.left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
+                             cut_window(scene.right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};
   };
   std::vector<Time> done;
   size_t wrong = 0;
@@ -75,7 +77,7 @@ bool measure(const SweepSetup& setup, const Scene& scene, const Plan& plan, int 
       client, capabilities, plan.table, tiles, options, input,
       [&](int i, const std::vector<golden::MapCell>& cells) {
         done.push_back(desk.now());
-        const net::LinkTile in = input(i);
+        const golden::TileInput in = input(i);
         const auto model = run_tile_fast(setup.format, in.job, plan.table, in.left, in.right);
         for (size_t c = 0; c < cells.size(); ++c)
           wrong += net::pack_wire_cell(setup.format, cells[c]) != net::pack_wire_cell(setup.format, model.cells[c]);

@@ -9,10 +9,12 @@
 #include <deque>
 #include <random>
 
-#include "chip/chip_transport.hpp"
+#include "desk/chip_transport.hpp"
+#include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "net/link_engine.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;
@@ -52,12 +54,12 @@ struct Bench {
     s.seed = seed;
     return s;
   }
-  net::LinkTile tile(int number) const {
+  golden::TileInput tile(int number) const {
     const auto seed = static_cast<uint32_t>(number);
     return {job, pixels(job.win_cols, job.win_rows, 2 * seed + 1), pixels(job.win_cols, job.win_rows, 2 * seed + 2)};
   }
   void compare(int number, const std::vector<golden::MapCell>& cells) const {
-    const net::LinkTile in = tile(number);
+    const golden::TileInput in = tile(number);
     const auto model = golden::run_tile(config.engine, job, {plane}, in.left, in.right);
     REQUIRE(cells.size() == model.cells.size());
     size_t wrong = 0;

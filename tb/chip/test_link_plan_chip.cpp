@@ -6,9 +6,11 @@
 #include <cstdio>
 
 #include "chip/watched.hpp"
+#include "forecast/link_plan.hpp"
+#include "golden/control.hpp"
 #include "net/link_engine.hpp"
-#include "plan/link_plan.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;
@@ -58,7 +60,7 @@ Measured measure(const Case& k, int tiles, const LinkPlanOptions& o) {
       client, capabilities, std::vector<golden::PlaneEntry>(static_cast<size_t>(k.planes), plane), tiles, options,
       [&](int) {
         const golden::Pixels blank(job.win_cols, job.win_rows);
-        return net::LinkTile{job, blank, blank};
+        return golden::TileInput{job, blank, blank};
       },
       [](int, const std::vector<golden::MapCell>&) {}, [](uint64_t) {});
   REQUIRE(desk.chip().launches() == tiles);

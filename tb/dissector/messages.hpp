@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "contract/protocol.hpp"
 #include "dissector/pdml.hpp"
 #include "net/client.hpp"
-#include "net/protocol.hpp"
 
 namespace psweep::tb {
 

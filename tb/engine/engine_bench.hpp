@@ -10,10 +10,10 @@
 #include <sstream>
 #include <string>
 
-#include "engine/stimulus.hpp"
+#include "contract/registers.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
-#include "rtl/registers.hpp"
+#include "scene/stimulus.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/stream.hpp"
@@ -57,19 +57,19 @@ class EngineBench : public Agent {
 
   // Stimuli
   // ------------------------------------------------------------------------------------------------------------
-  void write(uint16_t address, uint32_t value) { cfg.push(rtl::RegisterWrite{address, value}.word()); }
+  void write(uint16_t address, uint32_t value) { cfg.push(golden::RegisterWrite{address, value}.word()); }
   void command(uint32_t bits) { write(golden::kRegCommand, bits); }
   void write_table(const std::vector<golden::PlaneEntry>& table) {
-    for (const auto& w : rtl::table_writes(table)) write(w.address, w.value);
+    for (const auto& w : golden::table_writes(table)) write(w.address, w.value);
   }
   void write_job(const golden::TileJob& job) {
-    for (const auto& w : rtl::job_writes(job)) write(w.address, w.value);
+    for (const auto& w : golden::job_writes(job)) write(w.address, w.value);
   }
   // Packet of the first `count` pixels (all by default), tlast on the last of them unless `last` is false.
-  void send_pixels(const Stimulus& s, size_t count = ~size_t{0}, bool last = true) {
+  void send_pixels(const scene::Stimulus& s, size_t count = ~size_t{0}, bool last = true) {
     count = std::min(count, s.left.data.size());
     for (size_t i = 0; i < count; ++i)
-      pix.push(uint64_t{s.right.data[i]} << config_.pix_bits | s.left.data[i], last && i + 1 == count);
+      pix.push(golden::pixel_beat(config_, s.left, s.right, i), last && i + 1 == count);
   }
   void flush_cfg() {
     sim.run_until([&] { return cfg.done(); });
@@ -80,7 +80,7 @@ class EngineBench : public Agent {
   }
 
   // A good tile from registers to the last cell.
-  void run(const Stimulus& s) {
+  void run(const scene::Stimulus& s) {
     INFO(s.name << ", tile " << tiles_ << ", stalls " << stalls_.cfg << ' ' << stalls_.pix << ' ' << stalls_.map);
     sim.run(2);  // counters of what went before come to rest
     const unsigned done = dut.tiles_done, count_before = dut.error_count, lost_before = dut.window_errors;
@@ -106,7 +106,7 @@ class EngineBench : public Agent {
 
   // Expectations
   // -------------------------------------------------------------------------------------------------------
-  void expect(const Stimulus& s) {
+  void expect(const scene::Stimulus& s) {
     stimulus_ = s;
     next_plane_ = 0;
     expected_lost_ = 0;
@@ -137,7 +137,8 @@ class EngineBench : public Agent {
     try {
       sim.run_until(done);
     } catch (const Timeout& e) {
-      FAIL(e.what() << ", state " << int(dut.state) << ", errors " << rtl::error_names(dut.errors) << '\n' << report());
+      FAIL(e.what() << ", state " << int(dut.state) << ", errors " << golden::error_names(dut.errors) << '\n'
+                    << report());
     }
   }
   bool ok() const {
@@ -294,8 +295,9 @@ class EngineBench : public Agent {
     }
     if (next_plane_ == t.planes) {
       for (size_t i = 0; i < cells_.size(); ++i)
-        cell_.expect(cell_word(rtl::pack_cell(config_, golden::unload(cells_[i], t.threshold)), i + 1 == cells_.size()),
-                     {tile, -1, static_cast<int>(i) % t.tile_cols, static_cast<int>(i) / t.tile_cols});
+        cell_.expect(
+            cell_word(golden::pack_cell(config_, golden::unload(cells_[i], t.threshold)), i + 1 == cells_.size()),
+            {tile, -1, static_cast<int>(i) % t.tile_cols, static_cast<int>(i) / t.tile_cols});
     }
   }
   static uint64_t cell_word(uint64_t data, bool last) { return data << 1 | uint64_t{last}; }
@@ -323,7 +325,7 @@ class EngineBench : public Agent {
   std::deque<Lane> lanes_;  // stay where they are
   Scoreboard map_address_{"map address"}, map_word_{"map word"}, cell_{"cell"};
   std::vector<Scoreboard*> boards_;
-  Stimulus stimulus_;
+  scene::Stimulus stimulus_;
   std::vector<golden::Cell> cells_;
   int next_plane_ = 0, tiles_ = 0, most_planes_ = 0;
   bool pending_ = false, muted_ = false;

@@ -53,12 +53,12 @@ struct Scene {
     plan = plan_tiles(setup, size.cols, size.rows);
     std::vector<std::vector<golden::MapCell>> cells;
     for (size_t i = 0; i < plan.tiles.size(); ++i) {
-      const net::LinkTile t = tile(static_cast<int>(i));
+      const golden::TileInput t = tile(static_cast<int>(i));
       cells.push_back(golden::run_tile(setup.format, t.job, plan.table, t.left, t.right).cells);
     }
     expected = assemble(setup.rig, plan, cells);
   }
-  net::LinkTile tile(int i) const {
+  golden::TileInput tile(int i) const {
     const PlacedTile& t = plan.tiles[i];
     return {t.job, cut_window(left, t.left_x, t.left_y, t.job.win_cols, t.job.win_rows),
             cut_window(right, t.right_x, t.right_y, t.job.win_cols, t.job.win_rows)};

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "contract/frames.hpp"
 #include "golden/arbiter.hpp"
-#include "net/frames.hpp"
 #include "net/transport.hpp"
 
 namespace psweep {

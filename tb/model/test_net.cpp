@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "core/error.hpp"
+#include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "model/link_scene.hpp"
 #include "model/simulated_link.hpp"
@@ -179,7 +180,7 @@ TEST_CASE("the link is kept full, and so is the engine", "[net]") {
   });
   golden::TileJob job;
   job.tile_cols = 256, job.tile_rows = 130, job.win_cols = 340, job.win_rows = 144, job.planes = 1;
-  const net::LinkTile tile{job, golden::Pixels(340, 144), golden::Pixels(340, 144)};
+  const golden::TileInput tile{job, golden::Pixels(340, 144), golden::Pixels(340, 144)};
   const int count = 20, in_flight = GENERATE(1, 2);
   const double sweep = GENERATE(0.0, 0.07);  // the second: 301 planes take longer
   CAPTURE(in_flight, sweep);

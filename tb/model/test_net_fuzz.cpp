@@ -18,7 +18,7 @@
 #include <random>
 #include <string>
 
-#include "golden/registers.hpp"
+#include "contract/registers.hpp"
 #include "model/link_scene.hpp"
 #include "model/simulated_link.hpp"
 #include "net/link_engine.hpp"

@@ -7,20 +7,20 @@
 #include <exception>
 #include <random>
 
-#include "chip/chip_transport.hpp"
-#include "chip/chips.hpp"
-#include "chip/station.hpp"
+#include "desk/chip_transport.hpp"
+#include "desk/station.hpp"
 #include "net/client.hpp"
 #include "net/link_engine.hpp"
 #include "replay/chip_recorder.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;
 
 namespace {
 
-net::LinkTile random_tile(const golden::Config& e, std::mt19937& random) {
-  net::LinkTile t;
+golden::TileInput random_tile(const golden::Config& e, std::mt19937& random) {
+  golden::TileInput t;
   t.job.tile_cols = std::min(e.plane_cols, e.img_cols - e.window - 2);
   t.job.tile_rows = std::min(e.plane_rows, e.img_rows - e.window);
   t.job.win_cols = t.job.tile_cols + e.window + 2;  // samples, two pixels of shift, a neighbour
@@ -85,7 +85,7 @@ void run(const Chip& chip, const std::string& file, const std::vector<std::strin
   client.send(net::kWrite, 5, 0, net::Bytes(10, 1), net::kFlagAnswer);
   client.receive(1e-3);
   net::write_table(client, chip.config, table);
-  net::LinkTile tile = random_tile(chip.config.engine, random);
+  golden::TileInput tile = random_tile(chip.config.engine, random);
   tile.job.win_cols = 4095;
   client.request(net::kStart, 0, 0, net::start_payload(chip.config, tile.job, 1));
   client.request(net::kStatus);

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "golden/config.hpp"
+#include "contract/config.hpp"
 #include "golden/control.hpp"
 #include "psweep_pins.hpp"
 #include "replay/recording.hpp"

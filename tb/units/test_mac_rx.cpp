@@ -6,9 +6,9 @@
 
 #include "Vmac_rx.h"
 #include "Vmac_rx_upset.h"
+#include "contract/frames.hpp"
 #include "golden/mac_rx.hpp"
 #include "golden/mac_tx.hpp"
-#include "net/frames.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"

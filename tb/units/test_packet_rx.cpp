@@ -2,8 +2,8 @@
 // packet_rx: pulses of the counters, messages and stored frames equal the model clock by clock and byte by byte. All
 // lengths of UDP and ICMP, every bit of every header flipped, all faults alone and in pairs, checksums at their
 // corners, a full ring, random and mutated frames, garbage of any length; what waits in the ring stays as it is. Frames
-// come from net/frames.hpp, and the outcome of the fault pairs is written down here: neither is the model's opinion.
-// Upsets of every bit of every register: what waits is empty soon, and then all is right again.
+// come from contract/frames.hpp, and the outcome of the fault pairs is written down here: neither is the model's
+// opinion. Upsets of every bit of every register: what waits is empty soon, and then all is right again.
 #include <algorithm>
 #include <deque>
 #include <functional>

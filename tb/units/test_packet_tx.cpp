@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// packet_tx: every frame equals the model and net/frames.hpp byte by byte; all kinds, all lengths, checksums at their
-// corners, both peers, any gaps of the payload; slots in turn, written only while they are free and only where the
-// frame is; s_ready and the pulses to the clock, for every answer of the MAC at any time; abort at any time; mac_tx in
-// reset; upsets of every bit of every register.
+// packet_tx: every frame equals the model and contract/frames.hpp byte by byte; all kinds, all lengths, checksums at
+// their corners, both peers, any gaps of the payload; slots in turn, written only while they are free and only where
+// the frame is; s_ready and the pulses to the clock, for every answer of the MAC at any time; abort at any time; mac_tx
+// in reset; upsets of every bit of every register.
 #include <algorithm>
 #include <array>
 #include <deque>
@@ -47,8 +47,8 @@ struct Bench : Agent {
   Sim<Dut> sim{400000000, test_seed()};
   Dut& dut = sim.dut();
   std::mt19937 random{test_seed() + 29};
-  Scoreboard bytes{"frame"}, other{"net/frames.hpp"}, lengths{"f_length"}, writes{"ram_waddr"}, requests{"f_request"},
-      ready{"s_ready"}, pulses{"ev"}, times{"clocks"};
+  Scoreboard bytes{"frame"}, other{"contract/frames.hpp"}, lengths{"f_length"}, writes{"ram_waddr"},
+      requests{"f_request"}, ready{"s_ready"}, pulses{"ev"}, times{"clocks"};
   net::Address own;
   std::array<net::Address, 2> peers;
 
