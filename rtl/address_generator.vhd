@@ -1,20 +1,21 @@
 -- SPDX-License-Identifier: Apache-2.0
--- address_generator: where each sample of a plane lies in both images (paper, section 4.2). Owns the plane table.
+-- address_generator: computes where each sample of a plane lies in both images (paper, section 4.2). Owns the plane
+--                    table.
 --   Rate     : one sample per clock; rows at least C_ROW_MIN clocks apart
 --   Latency  : C_ADDRESS_LATENCY = 9 clocks from s_* to m_*; no bubble between rows or planes
 --   Numbers  : positions sfix(13,19), accumulated modulo 2^32 (exact); steps ufix(2,19): bits above 20 of a word must
 --              be 0 (those of dx are ignored, those of dy are added); fractions truncated to G_WEIGHT_W bits
---   Row      : with the strobe of a row (clock t) the words of that row are fetched, one a clock, in this order:
---              y0 or dy of both images, x0 of both, dx of both. One 32-bit adder makes all four start values. y parts
---              (floor, fraction, tests, bank row addresses) are computed once a row and change with its first sample.
---   usable_* : both images, inside and loaded; x and y apart, as x depends on the column only and y on the row only
---   Rectified: G_RECTIFIED = 1: rows of both images fall on rows of samples. A sample between two rows counts as not
---              loaded: not usable, and an error of the window if it is inside both images
---   Table    : 8 words a plane, see docs/interfaces.md; written while no sample is in work
---   Parity   : words of table and offsets have a parity bit (even), written with them; m_word_error tells a clock later
---              that a word which a row has read, or its bit, is not what was written
---   Rest     : m_row_* are 0 from the clock behind the last sample of a plane until the next row
---   Reset    : clears the strobes on their way, m_row_* and usable_y; positions have no reset
+--   Row      : the strobe of a row (clock t) starts the fetch of its words, one per clock, in this order: y0 or dy of
+--              both images, x0 of both, dx of both. One 32-bit adder makes all four start values. The y parts (floor,
+--              fraction, tests, bank row addresses) are computed once per row and change with its first sample.
+--   usable_* : inside both images and loaded; x and y are separate, as x depends on the column only and y on the row
+--   Rectified: with G_RECTIFIED = 1 the rows of samples must fall on rows of pixels. A sample between two rows counts
+--              as not loaded: it is not usable, and a window error if it is inside both images
+--   Table    : 8 words per plane (docs/registers.md); written only while no sample is in flight
+--   Parity   : words of table and offsets carry an even parity bit; m_word_error reports one clock later that a word
+--              read by a row, or its parity bit, is not what was written
+--   Idle     : m_row_* are 0 from the clock after the last sample of a plane until the next row
+--   Reset    : clears the strobes in flight, m_row_* and usable_y; positions have no reset
 --   Golden   : sw/golden/address_generator.hpp
 library ieee;
   use ieee.std_logic_1164.all;

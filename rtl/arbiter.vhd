@@ -1,15 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- arbiter: everything between the pins of an MII PHY and the streams of the engine (paper, sections 4.1 and 5.4).
+-- arbiter: the Ethernet front end, everything between the pins of an MII PHY and the streams of the engine, without a
+--          CPU (paper, sections 4.1 and 5.4).
 --   Structure : mac_rx -> async_fifo -> packet_rx -> responder -> packet_tx -> ram_dc -> mac_tx;
---               responder -> row_buffer -> s_pix, responder -> scheduler -> s_cfg, m_map -> map_buffer -> responder.
---               No CPU
---   Clocks    : clk, rx_clk and tx_clk are independent. What passes between them: the words of async_fifo, the frames
---               in ram_dc with their toggles, and levels that hardly ever change (constraints/)
---   Buffering : rows of the next tile arrive and the map of the last one leaves while a tile is swept. G_ROW_SLOTS and
---               G_MAP_DEPTH say how much of them has room (docs/arbiter.md)
---   Clocks of : clock_missing(0) rx_clk, (1) tx_clk: has not ticked from one millisecond of clk to the next, which the
---   the PHY     counters 37 and 38 count; '0' again with the millisecond after it has come back. Nothing waits for
---               them but what passes through them: without tx_clk no frame is sent, without rx_clk none is received
+--               responder -> row_buffer -> s_pix, responder -> scheduler -> s_cfg, m_map -> map_buffer -> responder
+--   Clocks    : clk, rx_clk and tx_clk are independent. Between them pass the words of async_fifo, the frames in ram_dc
+--               with their toggles, and levels that hardly ever change (constraints/)
+--   Buffering : the rows of the next tile arrive and the map of the last one leaves while a tile is swept. G_ROW_SLOTS
+--               and G_MAP_DEPTH set how much of them is buffered (docs/link.md)
+--   Missing   : clock_missing(0) is set if rx_clk, (1) if tx_clk has not ticked from one millisecond of clk to the
+--   clocks      next, which counters 37 and 38 count; it is cleared in the millisecond after the clock has returned.
+--               Without tx_clk no frame is sent, without rx_clk none is received; everything else works
 --   Protocol  : docs/protocol.md
 --   Reset     : synchronous, one for each clock
 --   Golden    : sw/golden/arbiter.hpp

@@ -1,18 +1,18 @@
 -- SPDX-License-Identifier: Apache-2.0
--- async_fifo: 2**G_DEPTH_LOG2 words between two clocks of any ratio.
+-- async_fifo: carries 2**G_DEPTH_LOG2 words between two clocks of any ratio.
 --   Rate     : one word per clock of the slower side, from a depth of 8 on
---   Latency  : a word shows with the second r_clk edge after the w_clk edge that took it (with the third if the first
---              came too close); a place is free again with the second or third w_clk edge after its word was taken
+--   Latency  : a word shows at the second r_clk edge after the w_clk edge that took it (at the third if the first came
+--              too close); a place is free again at the second or third w_clk edge after its word was taken
 --   Contract : r_valid never waits for r_ready; a word shown holds until it is taken (or a reset). First word falls
 --              through: r_data is valid while r_valid = '1', straight from the array (constraints/crossings.md).
---   Pointers : gray counters of one bit more than the address, no binary copy: the array is addressed in gray order,
---              which both sides share, and the next code of up to 5 bits is one LUT6 a bit
---   Reset    : w_rst and r_rst are synchronous to their clocks, at least one clock long (the first one after power-on
---              at least 3 clocks, on both sides). Either empties the FIFO and stops both sides (w_ready = r_valid =
---              '0') until both have seen it; as a pointer jumps only while the other side stands still, resets of one
---              side or of both in any order can neither invent words nor keep any. Over at most 8 w_clk plus 8 r_clk
---              after the last of them has ended; both clocks must run for that. A reset that comes when the last
---              one of its side is not yet over counts as part of it.
+--   Pointers : gray counters with one bit more than the address, without a binary copy: both sides address the array in
+--              gray order, and the next code of up to 5 bits is one LUT6 per bit
+--   Reset    : w_rst and r_rst are synchronous to their clocks and last at least one clock (the first one after
+--              power-on at least 3 clocks, on both sides). Either one empties the FIFO and stops both sides (w_ready =
+--              r_valid = '0') until both have seen it. As a pointer jumps only while the other side stands still,
+--              resets of one side or of both in any order neither invent words nor keep any. A reset is over at most 8
+--              w_clk plus 8 r_clk after it has ended; both clocks must run for that. One that begins before the last
+--              one of its side is over counts as part of it.
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- cdc_sync: flip-flops in a row, the only way of a bit from one clock to another.
---   Input   : d of any clock. Several bits must be independent of each other, or gray code (one bit changes at a time):
---             each may be seen one clock earlier or later than its neighbour. d must come straight from a flip-flop.
+-- cdc_sync: a row of flip-flops, the only way for a bit from one clock to another.
+--   Input   : d comes straight from a flip-flop of any clock. Several bits must be independent of each other, or gray
+--             code (one bit changes at a time), as each may be seen one clock earlier or later than its neighbour
 --   Latency : G_STAGES clocks, one more if d changes in the set-up time of the first flip-flop
---   Reset   : none; what q shows in the first G_STAGES clocks is undefined
+--   Reset   : none; q is undefined for the first G_STAGES clocks
 --   Tools   : ASYNC_REG keeps the row together and out of shift register LUTs (constraints/crossings.md)
 library ieee;
   use ieee.std_logic_1164.all;

@@ -1,22 +1,23 @@
 -- SPDX-License-Identifier: Apache-2.0
--- control: registers, checks, pixel packets and the order of samples of a tile (paper, section 4.2).
---   Streams  : s_cfg is always ready. s_pix is ready while loading or draining. Nothing inside the engine stalls: a
---              packet is taken as fast as it comes, the sweep runs to its end, and unload waits for its own stream only
---   States   : idle, load (pixels), sweep (samples), flush (cells on their way to the map), unload, drain (pixels of a
+-- control: registers, checks, pixel packets and the order of the samples of a tile (paper, section 4.2).
+--   Streams  : s_cfg is always ready, s_pix while loading or draining. Nothing inside the engine stalls: a packet is
+--              taken as fast as it comes, the sweep runs to its end, and unload waits for its own stream only
+--   States   : idle, load (pixels), sweep (samples), flush (cells in flight to the map), unload, drain (pixels of a
 --              tile that was refused or too long)
---   Sweep    : G_LANES planes at once, a set, then the next set; row after row, one sample a clock and lane; rows of
+--   Sweep    : one set of G_LANES planes after the other; row after row, one sample per clock and lane; rows of
 --              max(sweep_cols, C_ROW_MIN) clocks; the first sample two clocks after the last pixel; no bubble between
 --              rows or sets
---   Registers: sizes are kept less 1 and only if in range, so addresses derived from them are always legal
---   Writes   : take effect two clocks after they are on s_cfg, those of table and offsets three
---   Priority : of one command word: clear, then abort, then start (with abort, start is ignored). While a tile is in
---              work the address of a write is not looked at. A last map beat beats an abort in the same clock
---   Upsets   : the state has a parity bit: no upset of one bit makes another state of it. A code without a name, a map
---              that ends before or after its last beat, and a word of table or offsets that is not what was written
---              drop the tile a clock later (error bit 'upset'). Sets are counted to 'not below', so that no upset makes
---              a tile longer than the largest of the build
---   Counters : saturating, tiles_dropped and error_count a clock behind their event; clear also resets the latch that
---              counts window errors once a tile. tile_clocks is kept
+--   Registers: sizes are stored minus 1 and only if in range, so addresses derived from them are always legal
+--   Writes   : take effect two clocks after they are on s_cfg, those of table and offsets after three
+--   Priority : within a command word clear comes first, then abort, then start (abort suppresses start). While a tile
+--              is in work the address of a write does not matter. A last map beat wins against an abort in the same
+--              clock
+--   Upsets   : the state has a parity bit, so an upset of one bit never makes another legal state. An illegal code, a
+--              map that ends before or after its last beat, and a corrupted word of table or offsets drop the tile one
+--              clock later (error bit 'upset'). Sets are counted to 'not below', so that no upset makes a tile longer
+--              than the largest of the build
+--   Counters : saturating; tiles_dropped and error_count follow their event by one clock. Clear also resets the latch
+--              that counts window errors once per tile, and keeps tile_clocks
 --   Reset    : idle, sizes missing, table empty, counters 0; bounds are not reset: write them before the first start
 --   Golden   : sw/golden/control.hpp
 library ieee;

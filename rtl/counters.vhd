@@ -1,15 +1,16 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- counters: G_COUNT event counters of 32 bits in two RAMs with one adder; they wrap.
---   Events   : a pulse sets a pending bit. A scanner adds them to the counters, one every 4 clocks; four bits at a time
---              move into a shift register before, which takes less logic than to pick and clear single ones. So each
---              event may pulse once in 4*G_COUNT clocks; faster pulses of one event count as one. Counted after at
---              most 4*G_COUNT + 15 clocks
---   Read     : r_valid = '1': r_data is the counter r_index, read after r_index became what it is; both hold until
---              r_index changes. Up to 7 clocks later. A number from G_COUNT on reads something without meaning
---   Phases   : words are kept in halves, for an adder of 16 bits, each half in a RAM of its own: 0 read the scanned
---              counter's lower half, 1 write it back, read the upper one, 2 write it back, 3 read both halves of
---              r_index, 0 take them. A word that is read while it is written is not used
---   Reset    : rst only. A first scan of 4*G_COUNT clocks writes zeros; events until then may be lost, r_valid is '0'
+--   Events   : a pulse sets a pending bit. A scanner adds one counter's bit every 4 clocks; four bits at a time move
+--              into a shift register first, which takes less logic than selecting and clearing single ones. So each
+--              event may pulse once in 4*G_COUNT clocks; faster pulses of one event count as one. An event is counted
+--              after at most 4*G_COUNT + 15 clocks
+--   Read     : while r_valid = '1', r_data is the counter r_index, read after r_index took its value; both hold until
+--              r_index changes. It takes at most 7 clocks. A number from G_COUNT on reads a meaningless word
+--   Phases   : words are kept in halves, for an adder of 16 bits, each half in its own RAM. Phase 0 reads the scanned
+--              counter's lower half, 1 writes it back and reads the upper one, 2 writes that back, 3 reads both halves
+--              of r_index, and 0 takes them. A word that is read while it is written is not used
+--   Reset    : rst only starts a first scan of 4*G_COUNT clocks that writes zeros; events until then may be lost, and
+--              r_valid is '0'
 --   Golden   : sw/golden/counters.hpp
 library ieee;
   use ieee.std_logic_1164.all;

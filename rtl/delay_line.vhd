@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- delay_line: the word of G_DELAY clocks ago; shift registers where the device has them (SRL16/SRL32).
+-- delay_line: delays a word by G_DELAY clocks, in shift registers where the device has them (SRL16/SRL32).
 --   Rate    : one word per clock with ce = '1'; a clock without ce does not count
 --   Latency : G_DELAY = 1 .. 64 enabled clocks
---   Reset   : none, on purpose: a reset turns every SRL into a row of flip-flops
---   Why so  : for up to some 30 words; longer delays belong in ram_sdp
+--   Reset   : none, because a reset turns every SRL into a row of flip-flops
+--   Use     : for up to about 30 words; longer delays belong in ram_sdp
 library ieee;
   use ieee.std_logic_1164.all;
 

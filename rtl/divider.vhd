@@ -3,12 +3,12 @@
 --   Rate    : one division per clock
 --   Latency : G_QUOT_W clocks
 --   Numbers : operands ufix(G_NUM_W,0), quotient ufix(0,G_QUOT_W), truncated. Outside 0 <= num <= den, den > 0 the
---             quotient means nothing
---   Method  : non-restoring, one quotient bit a stage: remainder' = 2 remainder -/+ den, subtracting after a remainder
---             >= 0. The signs are those of restoring division, without its multiplexer: one adder a stage.
---   Reset   : none; validity travels outside
---   Stages  : s_num and s_den are what stage 0 gets; each gets the remainder and den of the one before, from words that
---             hold those of all stages, its own in the bits from its number times their width on
+--             quotient is undefined
+--   Method  : non-restoring, one quotient bit per stage: remainder' = 2 remainder -/+ den, subtracting after a
+--             remainder >= 0. The signs are those of restoring division, without its multiplexer: one adder per stage
+--   Reset   : none; the parent carries the valid bit
+--   Stages  : stage 0 gets s_num and s_den, every other one the remainder and den of the stage before. One word holds
+--             the remainders of all stages and another the dens, stage n from bit n times the width on
 --   Golden  : divide_fraction() in sw/golden/similarity.hpp
 library ieee;
   use ieee.std_logic_1164.all;

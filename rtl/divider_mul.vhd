@@ -1,17 +1,17 @@
 -- SPDX-License-Identifier: Apache-2.0
--- divider_mul: divider in three products: floor(num * 2^G_QUOT_W / den), all ones for num = den, of a den whose leading
---              one is on top. The same quotients after the same clocks; about a quarter of the logic.
+-- divider_mul: the quotients of divider after the same clocks, from three products, for a den whose top bit is '1':
+--              floor(num * 2^G_QUOT_W / den), all ones for num = den. About a quarter of the logic.
 --   Rate    : one division per clock
 --   Latency : G_QUOT_W clocks
---   Numbers : operands ufix(G_QUOT_W+3,0), 0 <= num <= den, quotient ufix(0,G_QUOT_W), truncated. Where the top bit of
---             den is '0' the quotient means nothing
---   Method  : reciprocal = base + slope * not den(low bits), both from a table under the bits behind the leading one;
---             guess = num * reciprocal, never below the quotient and at most one above it (docs/divider_mul.md); with
---             guess * den that one is taken back, in the adder behind this product
---   Bits    : below 8 bits there is no time for three products, and little to save: a divider
---   Reset   : none; validity travels outside
---   Why so  : den comes inverted, because both its products want it so; every product has registers around it and at
---             most one sum behind, so that it fits a DSP slice
+--   Numbers : operands ufix(G_QUOT_W+3,0), 0 <= num <= den, quotient ufix(0,G_QUOT_W), truncated. If the top bit of den
+--             is '0' the quotient is undefined
+--   Method  : reciprocal = base + slope * not den(low bits), both from a table addressed by the bits below the leading
+--             one; guess = num * reciprocal, which is the quotient or one more (docs/divider_mul.md). The adder behind
+--             guess * den corrects it
+--   Bits    : below 8 bits there is no time for three products and little to save, so a divider is built
+--   Reset   : none; the parent carries the valid bit
+--   Reasons : den comes inverted because both its products need it so. Every product has registers around it and at
+--             most one sum behind it, so that it fits a DSP slice
 --   Golden  : divide_fraction() in sw/golden/similarity.hpp
 library ieee;
   use ieee.std_logic_1164.all;

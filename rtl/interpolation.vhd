@@ -7,10 +7,10 @@
 --   Structure: three linear interpolations a + (b - a) f per image: upper row, lower row, between the rows. Each is one
 --              25x18 multiplier with its adders. Half a unit of the result, 2^(2W-F-1), is added where bits are free:
 --              for F < W as 2^(W-F-1) on both rows (their difference stays the same), else between the rows.
---   Rectified: G_RECTIFIED = 1: fy is 0 and the lower row not looked at; one linear interpolation per image, s1 to s3,
+--   Rectified: with G_RECTIFIED = 1 fy is 0 and the lower row is ignored; one linear interpolation per image, s1 to s3,
 --              with the same results
---   Unusable : the sample is 0 unless usable in x and y
---   Reset    : clears m_valid's way; data have no reset
+--   Unusable : the sample is 0 unless it is usable in x and y
+--   Reset    : clears the valids; data have no reset
 --   Golden   : sw/golden/interpolation.hpp
 library ieee;
   use ieee.std_logic_1164.all;

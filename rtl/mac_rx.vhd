@@ -1,24 +1,23 @@
 -- SPDX-License-Identifier: Apache-2.0
--- mac_rx: nibbles of MII to bytes and a verdict (IEEE 802.3: MAC clause 4.2.9, MII clause 22.2).
+-- mac_rx: turns nibbles of MII into bytes and a verdict (IEEE 802.3: MAC clause 4.2.9, MII clause 22.2).
 --   In       : mii_rxd, mii_rx_dv, mii_rx_er, in step with clk = the PHY's receive clock, 2.5 or 25 MHz
---   Out      : stream to async_fifo. The bytes behind the SFD with the FCS, at most 1518, then one beat with m_last and
---              the verdict, 0 = good: bit 0 FCS wrong (of the whole bytes), 1 odd nibble and FCS wrong, 2 less than 64
---              bytes, 3 more than 1518, 4 rx_er while rx_dv, from the preamble on, 5 a byte was lost because m_ready
---              was 0. An odd nibble behind a right FCS is dropped without mention (4.2.4.2.1: dribble bits).
---   SFD      : the first nibble D behind a 5, whatever comes before (4.2.9, PhysicalSignalDecap); without, nothing
+--   Out      : stream to async_fifo: the bytes after the SFD with the FCS, at most 1518, then one beat with m_last and
+--              the verdict, 0 = good. Its bits: 0 FCS wrong (of the whole bytes), 1 odd nibble and FCS wrong, 2 less
+--              than 64 bytes, 3 more than 1518, 4 rx_er while rx_dv, from the preamble on, 5 a byte was lost because
+--              m_ready was 0. An odd nibble after a right FCS is dropped silently (4.2.4.2.1: dribble bits).
+--   SFD      : the first nibble D after a 5, whatever comes before (4.2.9, PhysicalSignalDecap); without one nothing
 --              comes out
---   Rate     : a byte every 2 clocks, the verdict within 1 clock of the last byte; frames may follow one clock after
---              the other
---   Latency  : 2 clocks from the second nibble of a byte to its beat, from rx_dv = '0' to the verdict
---   Own frame: in half duplex a stretch of rx_dv in which `sending` is seen before the SFD is not received: a PHY that
---              loops the station's own frames back (as those of 10BASE-T do), or a collision
---   Contract : a beat shown holds until it is taken. It need not be taken at once, but 2 clocks later the next byte
---              comes and is lost if there is no room. The verdict is never lost: it waits; a frame whose rx_dv rises
---              while it waits is not received.
+--   Rate     : one byte every 2 clocks, the verdict within 1 clock of the last byte; frames may follow each other after
+--              one clock
+--   Latency  : 2 clocks from the second nibble of a byte to its beat, and from rx_dv = '0' to the verdict
+--   Own frame: in half duplex a stretch of rx_dv in which `sending` is seen before the SFD is not received: it is the
+--              station's own frame, looped back by the PHY (as those of 10BASE-T do), or a collision
+--   Contract : a beat shown holds until it is taken. The next byte comes 2 clocks later and is lost if there is no
+--              room. The verdict is never lost: it waits, and a frame whose rx_dv rises meanwhile is not received.
 --   Crossings: full_duplex and sending are synchronised here
---   Upsets   : hunting, in_frame and ended have no code that lasts: whatever they are, the end of rx_dv and of the
---              verdict leads back to the start. tick flips with each clock, which shows that there is one
---   Reset    : nothing shown; what is left of a frame in progress is not received
+--   Upsets   : no code of hunting, in_frame and ended lasts: the end of rx_dv and of the verdict leads back to the
+--              start from each. tick flips with each clock and so shows that there is one
+--   Reset    : nothing shown; the rest of a frame in progress is not received
 --   Golden   : sw/golden/mac_rx.hpp
 library ieee;
   use ieee.std_logic_1164.all;

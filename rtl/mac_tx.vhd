@@ -1,39 +1,39 @@
 -- SPDX-License-Identifier: Apache-2.0
--- mac_tx: frames from two slots of a RAM to nibbles of MII, full or half duplex (IEEE 802.3: MAC clause 4.2.8, MII
---         clause 22.2; CSMA/CD as in 4.2.3.2).
+-- mac_tx: sends frames from two slots of a RAM as nibbles of MII, full or half duplex (IEEE 802.3: MAC clause 4.2.8,
+--         MII clause 22.2; CSMA/CD as in 4.2.3.2).
 --   Frame    : 15 nibbles 5 and one D, the bytes with the low nibble first, zeros up to 60 bytes, FCS
 --   Gap      : full duplex: tx_en is low for exactly 24 nibbles if a frame waits. Half duplex: 24 clocks from the end
---              of tx_en or crs (of crs: two clocks of synchronisation and two of output come on top). crs in the first
---              15 starts the gap again, later it does not; a frame that waits when the gap ends goes out whatever crs
---              says then (4.2.3.2.1, where the first part is up to 2/3 of the gap).
---   Deferral : a frame that has waited for the gap for 2**14 nibbles (up to 16 fewer) in a row is given up: 65,536 bit
---              times. The standard's maxDeferTime, two frames of the largest size (24,288 bit times), ends nothing
---              there, it only counts; on a busy medium stations may rightfully go first for longer than that
---   Collision: col in nibble 0 .. 127 of a transmission (preamble included): preamble and SFD are completed, then come
---              8 nibbles of jam (all 5), and the frame is sent again after 0 .. 2**min(n, 10) - 1 slots of 128 nibbles
---              from the end of the jam and a gap, n = number of its collisions; given up at the 16th. From nibble 128
---              on: jam, not sent again. Not seen are collisions of the last four nibbles of a frame, which are late.
---   Random   : free-running LFSR of 17 bits (x**17 + x**14 + 1) from G_SEED, stirred by what the RAM says: the preamble
---              reads bytes 8 .. 15 for that. So stations of the same seed that run in step part ways at the first
---              collision if their source addresses differ in the last 4 bytes: a byte's two nibbles go in at every
+--              of tx_en or crs (for crs two clocks of synchronisation and two of output are added). crs in the first 15
+--              restarts the gap, later it does not; a frame that waits when the gap ends is sent whatever crs says then
+--              (4.2.3.2.1, where the first part is up to 2/3 of the gap).
+--   Deferral : a frame that has waited for the gap for 2**14 nibbles (up to 16 fewer) in a row, 65,536 bit times, is
+--              given up. The standard's maxDeferTime, two frames of the largest size (24,288 bit times), ends nothing
+--              there, it is only counted; on a busy medium other stations may rightfully send for longer than that
+--   Collision: col in nibble 0 .. 127 of a transmission (preamble included): preamble and SFD are completed, 8 nibbles
+--              of jam (all 5) follow, and the frame is sent again after 0 .. 2**min(n, 10) - 1 slots of 128 nibbles
+--              from the end of the jam and a gap, n = number of its collisions; it is given up at the 16th. From nibble
+--              128 on: jam, and the frame is not sent again. Collisions in the last four nibbles of a frame, which are
+--              late, are not seen.
+--   Random   : free-running LFSR of 17 bits (x**17 + x**14 + 1) from G_SEED, stirred by the RAM's output; the preamble
+--              reads bytes 8 .. 15 for that. So stations of the same seed that run in step separate at the first
+--              collision if their source addresses differ in the last 4 bytes: a byte's two nibbles enter at every
 --              fourth bit, hence at different bits, and cannot cancel.
---   Slots    : served 0, 1, 0, 1 ..; f_request(s) /= f_done(s): frame waits, f_length_s (14 .. 1514 bytes without FCS)
---              and its bytes stay still. f_done(s) flips when the frame is over, f_result_s (from the same clock on) is
---              0 sent, 1 given up after 16 collisions, 2 late collision, 3 given up after too long a deferral.
---              collisions flips at each collision.
---   Upsets   : more than one state at a time: none instead, the frame is sent again from its beginning, recovered
---              flips.
---              If only the slot waits whose turn it is not, it has its turn, and resynchronised flips: that happens
---              only if one of the two counts of turns was upset, as requests arrive in the order of their making.
---              f_done(s) becomes f_request(s), not the other value of itself, so that no upset of either outlasts a
---              frame. tick flips while there is a clock.
+--   Slots    : served 0, 1, 0, 1 ..; while f_request(s) /= f_done(s) a frame waits, and f_length_s (14 .. 1514 bytes
+--              without FCS) and its bytes stand still. f_done(s) flips when the frame is over; f_result_s (from the
+--              same clock on) is 0 sent, 1 given up after 16 collisions, 2 late collision, 3 given up after too long a
+--              deferral. collisions flips at each collision.
+--   Upsets   : if more than one state is set, all are cleared, the frame is sent again from its beginning, and
+--              recovered flips. If only the slot whose turn it is not waits, it gets the turn, and resynchronised
+--              flips: that happens only after an upset of one of the two counts of turns, as requests arrive in the
+--              order in which they are made. f_done(s) becomes f_request(s), not the complement of itself, so that no
+--              upset of either outlasts a frame. tick flips while there is a clock.
 --   Latency  : 2 clocks from a state to the pins; r_data is used one clock after r_addr
 --   Crossings: full_duplex, mii_crs, mii_col and f_request are synchronised here (one clock of doubt). full_duplex may
---              change at any time: it only decides whether crs and col are looked at.
---   Structure: one counter for nibbles of all states, whose upper bits count the slots of the backoff and are compared
+--              change at any time: it only decides whether crs and col are used.
+--   Structure: one counter of nibbles for all states; its upper bits count the slots of the backoff and are compared
 --              with as many bits of the LFSR (which stands still meanwhile) as there are ones in the shift register of
---              attempts. One hot state. The CRC's index nibble also makes txd: nibble = index xor crc.
---   Sending  : '1' with mii_tx_en, a clock earlier, for mac_rx
+--              attempts. One-hot states. The CRC's index nibble also makes txd: nibble = index xor crc.
+--   Sending  : mii_tx_en one clock earlier, for mac_rx
 --   Reset    : nothing is sent, a frame in transmission is cut off; f_done = f_request = 0 is the empty state
 --   Golden   : sw/golden/mac_tx.hpp
 library ieee;

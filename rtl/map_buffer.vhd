@@ -1,23 +1,23 @@
 -- SPDX-License-Identifier: Apache-2.0
--- map_buffer: the map of one tile, written as the engine unloads it, read in chunks as bytes (docs/protocol.md,
---             'Data').
---   Whole    : G_DEPTH >= G_CELLS: cell n at word n, always room. keep means nothing
+-- map_buffer: stores the map of one tile as the engine unloads it, and gives it back in chunks as bytes
+--             (docs/protocol.md, 'Data').
+--   Whole    : G_DEPTH >= G_CELLS: cell n at word n, always room; keep has no meaning
 --   Ring     : G_DEPTH < G_CELLS, a multiple of G_CHUNK_CELLS: cell n at word n mod G_DEPTH. A chunk is begun when all
---              chunks that lie G_DEPTH cells or more before it are below keep. keep belongs to the map inside: 0 in
---              the clock after started, larger when the host asks; a keep that falls is ignored until the next map.
---              It must not pass a chunk that is being sent
---   Write    : a cell per clock; empty: ready. complete after s_tlast, then not ready until release_map or clear
---   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on: chunk f_chunk may be
---              started. From f_start the start address walks from chunk 0, a clock a chunk, so that nothing of an
---              earlier chunk decides where it lies. f_chunk has to hold until the first byte
+--              chunks that lie G_DEPTH cells or more before it are below keep. keep belongs to the map inside: 0 in the
+--              clock after started, larger when the host asks; a keep that falls is ignored until the next map. It must
+--              not pass a chunk that is being sent
+--   Write    : one cell per clock. complete after s_tlast, then not ready until release_map or clear
+--   Read     : f_ready = '1' from three clocks after the latest change of f_chunk or keep on means that chunk f_chunk
+--              may be started. From f_start on the start address walks from chunk 0, one chunk per clock, so that
+--              nothing of an earlier chunk affects it. f_chunk has to hold until the first byte
 --   Bytes    : ceil(G_CELL_W/8) per cell, big endian, zeros above the cell, and one idle clock after each cell. f_valid
 --              and f_data hold until f_take
 --   RAM      : ram_deep with columns of nine bits: 31 bits of 32760 cells in 28 blocks
---   Forget   : release_map or clear, in any clock, also while cells come or bytes go; clear comes first on f_valid, too
---   fail     : the launched tile has failed in the engine: a map that is not complete is forgotten; a chunk that is
---              being sent goes on to its end
---   Upsets   : the states of either side differ in two bits; any other code: as clear, and recovered for a clock. Then
---              the map is lost, and who waits for bytes waits in vain
+--   Forget   : release_map or clear, in any clock, also while cells come or bytes go; clear also wins on f_valid
+--   fail     : the launched tile has failed in the engine: an incomplete map is forgotten; a chunk that is being sent
+--              continues to its end
+--   Upsets   : the states of either side differ in two bits; any other code acts as clear and sets recovered for one
+--              clock. The map is then lost, and a reader that waits for bytes never gets them
 --   Golden   : sw/golden/map_buffer.hpp
 library ieee;
   use ieee.std_logic_1164.all;

@@ -1,48 +1,47 @@
 -- SPDX-License-Identifier: Apache-2.0
--- packet_rx: frames of the MAC -> messages for the responder: ARP requests, ICMP echo requests, UDP to one port, and
---            UDP to any other port (closed), which is told to its sender.
---   Input     : bytes behind the SFD, FCS included; then one beat with s_last whose s_data is the MAC's verdict
---               (mac_rx; 0 = good: at least 64, at most 1518 bytes, FCS right). s_ready is low in the one clock behind
---               a verdict
+-- packet_rx: turns frames of the MAC into messages for the responder: ARP requests, ICMP echo requests, UDP to one
+--            port, and UDP to any other port, whose sender is told.
+--   Input     : bytes after the SFD, FCS included; then one beat with s_last whose s_data is the MAC's verdict
+--               (mac_rx; 0 = good: at least 64, at most 1518 bytes, FCS right). s_ready is low in the clock after a
+--               verdict
 --   Accepts   : destination own_mac; broadcast for ARP only. ARP (RFC 826): Ethernet, IPv4, request, target own_ip.
 --               IPv4 (RFC 791): header of 5 words, total length at least 28 and within the frame, header checksum, not
 --               a fragment, destination own_ip; with ICMP (RFC 792): type 8, code 0, checksum over the message; or with
---               UDP (RFC 768): length = total length - 20, checksum (0: none). What lies behind the IP packet (padding,
---               FCS) is not looked at
---   Sources   : refused are, as RFC 1122 (3.2.1.3) has it: source MAC with the group bit, or own_mac; source IP of 0/8,
+--               UDP (RFC 768): length = total length - 20, checksum (0: none). Anything behind the IP packet (padding,
+--               FCS) is ignored
+--   Sources   : refused, as RFC 1122 (3.2.1.3) demands: source MAC with the group bit, or own_mac; source IP of 0/8,
 --               127/8, 224/4 and 240/4, or own_ip; ARP: sender's MAC with the group bit, or own_mac, sender's IP own_ip
 --               (0.0.0.0 is a probe, RFC 5227, and answered)
 --   Output    : m_valid, m_kind (0 ARP, 1 ICMP, 2 UDP, 3 UDP to another port than G_UDP_PORT), m_length (ICMP: bytes
 --               from frame byte 34 on, UDP: payload, from byte 42 on; ARP: 0) of the oldest message, until m_done; its
 --               frame through r_addr, r_data (1 clock)
 --   Ring      : G_SLOTS * 2 KB in granules of 512 bytes. A frame takes 1 to 3 of them, as many as it needs, FCS
---               included. Bytes are stored as they come, and a frame becomes a message at its verdict only. Each of its
---               granules must be free at its first byte; else the frame is lost. What waits is never touched, whatever
---               the input
+--               included. Bytes are stored as they come, and a frame becomes a message only at its verdict. Each of its
+--               granules must be free at its first byte, else the frame is lost. Waiting messages are never
+--               overwritten, whatever the input
 --   Events    : bits 0 to 15: counter of that number in docs/protocol.md; 16 bad_source, 17 rx_fragment, 18
---               resynchronised (not of a frame). One pulse a frame two clocks behind its verdict, a message two (0 and
---               its kind; kind 3: 0 and 9). Order: the MAC's verdict (8, 5, 4, 3 or, in half duplex with a wrong FCS,
---               17, 2, 1), 6 destination MAC, 9 ethertype or ARP, 10 IP header, 16 source, 11 fragment, 9 protocol or
---               ICMP type, 12 UDP length or checksum, 7 no slot
---   Upsets    : a message says how many granules it has (1 to 3) and in which lap it was written. One of no granules or
---               of another lap than the reader's was there before a pointer was upset, and more granules in use than
---               there are mean the same: then the ring begins anew, empty, without the frame that is just coming in
---               (resynchronised). So whatever is upset, the reader
---               moves towards the writer with each message, shows at most as many wrong ones as there are granules, and
---               with an empty ring all is right again
---   Latency   : m_valid 3 clocks behind the verdict
---   Structure : one position counter. It starts at -34, so that it counts the bytes behind the IP header without a
---               second one; its lower 6 bits name every header byte. Each byte is compared with one expected byte, and
---               a bit that sticks remembers the class of what differed.
---               Sums: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits
+--               resynchronised (not of a frame). One pulse per frame two clocks after its verdict, for a message two (0
+--               and its kind; kind 3: 0 and 9). Order: the MAC's verdict (8, 5, 4, 3 or, in half duplex with a wrong
+--               FCS, 17, 2, 1), 6 destination MAC, 9 ethertype or ARP, 10 IP header, 16 source, 11 fragment, 9 protocol
+--               or ICMP type, 12 UDP length or checksum, 7 no slot
+--   Upsets    : a message is stored with its number of granules (1 to 3) and the lap in which it was written. A message
+--               without granules or of another lap than the reader's, or more granules in use than there are, reveals
+--               that a pointer was upset: the ring is emptied, and the frame that is coming in is lost
+--               (resynchronised). So whatever is upset, the reader moves towards the writer with each message, shows at
+--               most as many wrong ones as there are granules, and with an empty ring everything is right again
+--   Latency   : m_valid 3 clocks after the verdict
+--   Structure : one position counter. It starts at -34, so that it also counts the bytes after the IP header; its lower
+--               6 bits identify every header byte. Each byte is compared with one expected byte, and a sticky bit
+--               records the class of any difference.
+--               Sums: ones' complement, 8 bits per byte: {high, low} rotate by a byte at each step, and the carry waits
 --               for the next byte, whichever half that is. One for the IP header; one for ICMP, or for UDP with
 --               addresses, total length and a constant in place of the pseudo header (17 + length = total length - 3).
---               Both are right when all ones; the bytes behind the end add nothing, but settle the carry. Whatever is
---               past the end of the IP packet must be 4 bytes at least, the FCS: else the length was wrong.
---               The ring is addressed with the position, too: granule of the frame + its upper two bits, mod
---               granules. So the first 34 bytes (position -34 .. -1) are the last 34 of the granule before, which no
---               frame uses for its own end: the next one is taken at frame byte 512, position 478. Pointers are granule
---               numbers with one bit more, the lap; kind, length and granules of a message are kept under its first one
+--               Both are right when all ones; bytes behind the end add nothing, but settle the carry. Past the end of
+--               the IP packet there must be at least 4 bytes, the FCS: else the length was wrong.
+--               The ring is addressed with the position, too: granule of the frame + its upper two bits, mod granules.
+--               So the first 34 bytes (position -34 .. -1) are the last 34 of the granule before, which no frame uses
+--               for its own end: the next one is taken at frame byte 512, position 478. Pointers are granule numbers
+--               with one bit more, the lap; kind, length and granules of a message are stored under its first granule
 --   Reset     : no message, next byte is the first of a frame; RAM and data registers have no reset
 --   Golden    : sw/golden/packet_rx.hpp
 library ieee;

@@ -1,31 +1,31 @@
 -- SPDX-License-Identifier: Apache-2.0
--- packet_tx: ARP reply (RFC 826), ICMP echo reply or port unreachable (RFC 792) or UDP packet (RFC 768) in a frame
---            slot of mac_tx.
+-- packet_tx: builds an ARP reply (RFC 826), ICMP echo reply or port unreachable (RFC 792) or UDP packet (RFC 768) in a
+--            frame slot of mac_tx.
 --   Input     : s_start (pulse, only while s_ready) with s_kind 0 ARP, 1 ICMP echo, 2 UDP, 3 ICMP port unreachable, and
---               the peer's bank; then the payload, 1 .. 1472 bytes with p_last (ICMP: from frame byte 38 on, UDP: from
---               42 on; ARP: none), with any gaps. The peer's bytes (0-5 MAC, 6-9 IP, 10-11 UDP port) stand still from
---               s_start until s_ready
---   Abort     : s_abort: the frame being built is forgotten; what is requested stays. s_ready as usual from the next
+--               the peer's bank; then the payload, 1 .. 1472 bytes with p_last (ICMP: up to 1476, from frame byte 38
+--               on; UDP: from 42 on; ARP: none), with any gaps. The peer's bytes (0-5 MAC, 6-9 IP, 10-11 UDP port)
+--               stand still from s_start until s_ready
+--   Abort     : s_abort forgets the frame being built and leaves requested ones alone. s_ready is valid from the next
 --               clock on
 --   Output    : the frame without padding and FCS, at slot & byte of ram_dc; then f_request of the slot flips. Slots
 --               take turns. IPv4 (RFC 791): id 0, do not fragment, TTL 64. UDP from port G_UDP_PORT, checksum 0 sent
 --               as 0xffff
 --   Events    : ev_sent, ev_excessive, ev_late, ev_deferred: one pulse when f_done of a slot comes back
---   Upsets    : more than one of the steps of building at a time: the frame is forgotten, pulse of ev_recovered.
---               f_request(s) becomes what f_done(s) is not, so that no upset of either outlasts a frame; which slot is
---               next is this entity's choice, and mac_tx follows
---   Time      : a clock for each byte of the payload, then 170 clocks (ICMP: 154)
---   Structure : the payload goes first, so that all lengths are known when the header is written. The header is walked
+--   Upsets    : if more than one step of building is set, the frame is forgotten and ev_recovered pulses. f_request(s)
+--               becomes the complement of f_done(s), so that no upset of either outlasts a frame. This entity chooses
+--               the next slot, and mac_tx follows
+--   Time      : one clock per byte of the payload, then 170 clocks (ICMP: 154)
+--   Structure : the payload comes first, so that all lengths are known when the header is written. The header is walked
 --               through four times: written and summed for UDP; UDP or ICMP checksum written; summed for IP; IP
 --               checksum written. So there is one sum, nothing is patched, and the walk has no jumps. A byte of the
---               header comes from: constants, own addresses and lengths, the peer's memory, the sum. The lower bits of
---               the byte number address the peer's memory.
---               Sum: ones' complement, 8 bits a byte: {high, low} turn by a byte at each step, and the carry waits for
---               the next byte. UDP sums bytes 14-23, 26-39 and, in place of the IP checksum, a constant that turns the
---               former into the pseudo header
+--               header comes from constants, own addresses and lengths, the peer's memory, or the sum. The lower bits
+--               of the byte number address the peer's memory.
+--               Sum: ones' complement, 8 bits per byte: {high, low} rotate by a byte at each step, and the carry waits
+--               for the next byte. UDP sums bytes 14-23, 26-39 and, in place of the IP checksum, a constant that turns
+--               the former into the pseudo header
 --   Crossing  : f_done and tx_rst through cdc_sync; f_result stands still beside f_done
---   Reset     : both slots free; data registers have no reset. While tx_rst, of mac_tx, is seen, as long as there is no
---               tx_clk, no slot is free, none is requested, and f_done means nothing
+--   Reset     : both slots free; data registers have no reset. While tx_rst (of mac_tx) is seen, which lasts as long as
+--               there is no tx_clk, no slot is free, none is requested, and f_done has no meaning
 --   Golden    : sw/golden/packet_tx.hpp
 library ieee;
   use ieee.std_logic_1164.all;

@@ -1,21 +1,21 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- psweep: the plane-sweep stereo engine (paper, section 4.2, figure 4): a tile of pixels in, a tile of depth cells out.
---   Streams   : s_cfg registers and plane table, s_pix the window of both images, m_map the cells (docs/interfaces.md)
---   Rate      : one plane cell per clock through the whole sweep, no bubble between rows or planes
+--   Streams   : s_cfg registers and plane table, s_pix the window of both images, m_map the cells (docs/registers.md)
+--   Rate      : one plane cell per clock and lane through the whole sweep, no bubble between rows or planes
 --   Clocks    : from the start command to the last map beat (port tile_clocks), without stalls outside,
 --                 win_cols * win_rows + tile_cols * tile_rows
 --               + ceil(planes / G_LANES) * (tile_rows + G_WINDOW - 1) * max(tile_cols + G_WINDOW - 1, 8)
 --               - max(0, 8 - (tile_cols + G_WINDOW - 1)) + 48 + G_LANES + G_MNCC_W + G_FRAC_W - 3 G_RECTIFIED
---               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once a tile
+--               = engine_clocks() of sw/golden/control.hpp; the bench checks it. The fill is paid once per tile
 --   Numbers   : docs/numeric_contract.md
 --   Lanes     : G_LANES planes (1, 2 or 4) are swept at once over one image buffer and one map, with the same results
---               bit by bit. address_generator, interpolation and similarity are per lane; bundles hold lane 0 in the
---               low bits. Lane n sweeps planes n, n + G_LANES, n + 2 G_LANES ..; its part of the plane table holds just
---               those. Lanes beyond the last plane rest
+--               bit by bit. Each lane has its own address_generator, interpolation and similarity; vectors hold lane 0
+--               in the low bits. Lane n sweeps planes n, n + G_LANES, n + 2 G_LANES ..; its part of the plane table
+--               holds just those. Lanes beyond the last plane rest
 --   Rectified : G_RECTIFIED = 1 is a smaller build for pairs whose rows correspond: no interpolation between rows, two
---               banks an image instead of four. Same results where all samples lie on rows of pixels; a sample between
+--               banks per image instead of four. Same results if all samples lie on rows of pixels; a sample between
 --               rows counts as not loaded (window error)
---   Divider   : G_DIVIDER = 1 divides in three products a lane: less logic, same results and clocks (similarity)
+--   Divider   : G_DIVIDER = 1 divides in three products per lane: less logic, same results and clocks (similarity)
 --   Split     : G_SPLIT = 1 for multipliers of 18 x 18 bits: a higher clock there, same results and clocks (similarity)
 --   Reset     : synchronous, in any state; back to idle, table empty, sizes missing
 --   dbg_*     : outputs of the stages for waves and tests; leave open

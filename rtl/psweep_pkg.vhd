@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- psweep_pkg: constants and helpers shared by all entities of the engine.
---   Formats   : positions sfix(13,19) in 32 bits, steps ufix(2,19) in 21 bits    (docs/interfaces.md)
+--   Formats   : positions sfix(13,19) in 32 bits, steps ufix(2,19) in 21 bits    (docs/numeric_contract.md)
 --   Latencies : clocks from an entity's input to its output; parents add them up, sw/golden/control.hpp mirrors them
 --   Golden    : sw/contract/config.hpp (formats), sw/golden/control.hpp (states, errors, latencies)
 library ieee;
@@ -58,12 +58,12 @@ package psweep_pkg is
   function similarity_latency (mncc_w : positive) return positive;
   function updating_latency (frac_w, lanes : integer) return positive;
 
-  -- Bits that hold 0 .. n-1, at least 1. An illegal n (below 1) is for the assertion of who uses it to report.
+  -- Bits that hold 0 .. n-1, at least 1. Requires n >= 1; the caller asserts this.
   function clog2 (n : integer) return positive;
 
   function imax (a, b : integer) return integer;
 
-  -- Sets of `lanes` planes that are swept one after the other. Illegal numbers are for the assertions.
+  -- Sets of `lanes` planes that are swept one after the other. The caller asserts that both numbers are legal.
   function plane_sets (planes, lanes : integer) return positive;
 
   -- Words of a bank of storage. Four banks an image, by the parities of x and y; two, by the parity of x, in a build
@@ -72,9 +72,8 @@ package psweep_pkg is
   -- Bits of its addresses.
   function bank_bits (cols, rows, rectified : integer) return positive;
 
-  -- Words of part n of a RAM of many words, parts being powers of two, largest first; 0: there is no such part
-  -- (ram_deep, ram_2r). The address at which it starts, a multiple of the size of the part before it. And the number of
-  -- parts, 1 .. 4.
+  -- A RAM of many words is made of 1 .. 4 parts, powers of two, largest first (ram_deep, ram_2r): words of part n, 0 if
+  -- there is no such part; the address at which it starts, a multiple of the size of the part before it; their number.
   function deep_part (depth, n : integer) return integer;
   function deep_start (depth, n : integer) return integer;
   function deep_parts (depth : integer) return positive;

@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- psweep_top: the chip: plane-sweep engine, Ethernet arbiter, resets; the pins of an MII PHY (docs/interfaces.md).
+-- psweep_top: the chip: plane-sweep engine, Ethernet front end, resets; the pins of an MII PHY.
 --   Clocks : clk for the engine and the stack, from 30 MHz on; mii_rx_clk and mii_tx_clk from the PHY, 25 or 2.5 MHz.
 --            The three are independent (constraints/)
---   Reset  : arst_n, asynchronous, through a filter: a pulse that covers at most 15 edges of clk does nothing
---            (reset_filter). clk's reset makes those of the PHY's clocks, which end in step with them. So the engine
---            and the stack work without the clocks of the PHY; those may come, stop and go on at any time
+--   Reset  : arst_n, asynchronous, passes a filter: a pulse that covers at most 15 edges of clk is ignored
+--            (reset_filter). The reset of clk makes those of the PHY's clocks, which end in step with them. So the
+--            engine and the stack work without the clocks of the PHY, which may come, stop and return at any time
 --   clock_missing: bit 0 mii_rx_clk, bit 1 mii_tx_clk: has been missing for 1 to 2 ms or longer
---   Address: generics; straps are exclusive-ored into the last byte of MAC and IP address
+--   Address: generics; straps are XORed into the last byte of MAC and IP address
 --   dbg_*  : for waves and tests; leave open
 --   Golden : sw/golden/arbiter.hpp and sw/golden/psweep.hpp
 library ieee;

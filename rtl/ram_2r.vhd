@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- ram_2r: true dual-port RAM, one port that writes or reads and one that reads, one clock. What two lanes share: while
---         a tile is swept nobody writes, so both ports of one block RAM are free to read.
+-- ram_2r: true dual-port RAM with one clock: port a writes or reads, port b reads. Two lanes share one: while a tile is
+--         swept nothing is written, so both ports of a block RAM are free to read.
 --   Rate      : a: one write or read per clock; b: one read per clock
 --   Latency   : 2 clocks from a_addr to a_rdata and from b_addr to b_rdata (with the output registers of the blocks)
---   Parts     : as ram_deep with latency 2: the choice among them lies behind these registers
+--   Parts     : as ram_deep with latency 2: the selection lies behind these registers
 --   Collision : in the clock of a write a_rdata is undefined, and so is b_rdata if b_addr is the word written ('X' in
---               simulation; synthesis sees a port that does not change while it writes and one that reads the old word)
---   Addresses : 0 .. G_DEPTH-1 in every clock, whether or not the data are used; beyond, a simulation stops
+--               simulation; synthesis sees a port that keeps its word while it writes and one that reads the old word)
+--   Addresses : 0 .. G_DEPTH-1 in every clock, used or not; beyond, a simulation stops
 --   Reset     : none; contents survive reset. Zero at the start of a VHDL simulation, random in the Verilated model
 library ieee;
   use ieee.std_logic_1164.all;

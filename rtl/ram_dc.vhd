@@ -2,9 +2,9 @@
 -- ram_dc: simple dual-port RAM with two clocks, written in one and read in the other.
 --   Rate      : one write per w_clk, one read per r_clk
 --   Latency   : 1 r_clk from raddr to rdata
---   Collision : a word read while it is written may be anything, in every bit. Who reads must know by a handshake that
---               passed a cdc_sync after the write that it is over; simulation does not show a breach.
---   Addresses : 0 .. G_DEPTH-1 in every clock, whether or not the data are used; beyond, a simulation stops
+--   Collision : every bit of a word that is read while it is written is undefined, which simulation does not show. The
+--               reader must know, by a handshake that passed a cdc_sync after the write, that the write is over
+--   Addresses : 0 .. G_DEPTH-1 in every clock, used or not; beyond, a simulation stops
 --   Reset     : none; contents survive reset. Zero at the start of a VHDL simulation, random in the Verilated model
 library ieee;
   use ieee.std_logic_1164.all;

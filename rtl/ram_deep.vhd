@@ -1,14 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- ram_deep: ram_sdp for many words, in parts of 2**k words. Block RAMs are 2**k words deep (32768 of 1 bit, 16384 of 2
---           bits, ..), so a part needs no multiplexer, where a RAM of any depth is made of as many short and wide
---           blocks as its depth takes, with a multiplexer over all of them.
+--           bits, ..), so a part needs no multiplexer. Of any other depth, synthesis stacks short and wide blocks, with
+--           a multiplexer over all of them.
 --   Parts     : at most four, the largest power of two that fits first, up to 16384 if that is enough: 49280 words are
---               3 * 16384 + 512. One more power of two instead of a rest that is less than 2048 words from it: 16000
---               words are 16384 (deep_part)
---   G_NINES   : so many low bits (a multiple of 9) of parts from 8192 words on are kept in a RAM of their own, which
---               fits into blocks of 4096 * 9 bits: 8 blocks for 9 bits of 32768 words, not 9, and a multiplexer. 0: no
---   Latency   : G_LATENCY = 1 or 2 clocks from raddr to rdata. 2: each part's block has its output register, and the
---               choice among the parts lies behind it, so that no logic waits for a block
+--               3 * 16384 + 512. A remainder that is less than 2048 words below a power of two is rounded up to it:
+--               16000 words are 16384 (deep_part)
+--   G_NINES   : number of low bits (a multiple of 9; 0: none) that parts from 8192 words on keep in a RAM of their own,
+--               which fits into blocks of 4096 * 9 bits: 8 blocks for 9 bits of 32768 words instead of 9, and a
+--               multiplexer
+--   Latency   : G_LATENCY = 1 or 2 clocks from raddr to rdata. With 2 each part's block has its output register, and
+--               the selection lies behind it, so that no logic waits for a block
 --   Others    : collision, addresses and reset as ram_sdp
 library ieee;
   use ieee.std_logic_1164.all;

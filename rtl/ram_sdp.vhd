@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- ram_sdp: simple dual-port RAM, one write and one read port, one clock. All memories of the engine are behind this
---          entity, so that a device's own RAM macro needs one change only.
+--          entity or ram_2r, so that a device's own RAM macro needs one change only.
 --   Rate      : one write and one read per clock
 --   Latency   : G_LATENCY = 1 or 2 clocks from raddr to rdata (2: with the RAM's output register)
---   Collision : a word read in the clock in which it is written is undefined ('X' in simulation; synthesis sees a
---               read of the old word, the vendors' template). Nobody may rely on it: devices without read-first ports
---               show something else, or would pay with a bypass.
+--   Collision : a word read in the clock in which it is written is undefined ('X' in simulation; synthesis sees a read
+--               of the old word, the vendors' template). It must not be used: devices without read-first ports show
+--               something else, or would pay with a bypass
 --   Style     : block RAM; up to C_LUT_WORDS words LUT RAM (psweep_pkg)
---   Addresses : 0 .. G_DEPTH-1 in every clock, whether or not the data are used; beyond, a simulation stops
+--   Addresses : 0 .. G_DEPTH-1 in every clock, used or not; beyond, a simulation stops
 --   Reset     : none; contents survive reset. Zero at the start of a VHDL simulation, random in the Verilated model
 library ieee;
   use ieee.std_logic_1164.all;

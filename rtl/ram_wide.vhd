@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- ram_wide: ram_sdp for a depth that is a few blocks of 2048 words of 18 bits and little more. The low bits, as many
---           eighteens as there are, lie in such blocks and the words behind the last one in LUT RAM, with a
---           multiplexer over all; the bits above in a RAM of the whole depth. 14352 words of 20 bits are 7 blocks, 16
---           words beside them and one block of 16384 * 2 bits, where 16384 * 2 bits alone would be 10 blocks.
---   Otherwise : where that takes no block less, more than 32 words lie behind or the multiplexer has more than eight
---               inputs, just a ram_sdp
+-- ram_wide: ram_sdp for a depth just above a few blocks of 2048 words of 18 bits. The low bits, in multiples of 18, lie
+--           in such blocks and the words beyond the last block in LUT RAM, with a multiplexer over all; the bits above
+--           lie in a RAM of the whole depth. 14352 words of 20 bits are 7 blocks, 16 words beside them and one block of
+--           16384 * 2 bits; blocks of 16384 * 2 bits alone would be 10.
+--   Otherwise : where that saves no block, more than 32 words lie beyond or the multiplexer has more than eight inputs,
+--               just a ram_sdp
 --   Latency   : G_LATENCY = 1 or 2 clocks; the multiplexer is behind the blocks, in front of the second register. The
---               bits above have the output register of their blocks (ram_sdp)
+--               bits above use the output register of their blocks (ram_sdp)
 --   Others    : collision, addresses and reset as ram_sdp
 library ieee;
   use ieee.std_logic_1164.all;

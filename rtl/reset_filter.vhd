@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- reset_filter: the reset of clk, made from an asynchronous pin, without its glitches.
---   Begin : rst rises with the 18th edge of clk in a row that finds arst_n low. A pulse that covers at most 15 edges
---           does nothing
+-- reset_filter: makes the reset of clk from an asynchronous pin, without its glitches.
+--   Begin : rst rises with the 18th edge of clk in a row that finds arst_n low. A pulse that covers at most 15 edges is
+--           ignored
 --   End   : rst falls with the 18th edge in a row that finds arst_n high. So it lasts for at least 16 clocks, even if
 --           an upset of a flip-flop began it
---   Power : arst_n is low for at least 18 edges; whatever the flip-flops began with, rst is '1' then
---   Other : rst comes from a flip-flop, so that reset_sync may make the resets of other clocks of it. It needs clk
+--   Power : arst_n must be low for at least 18 edges; whatever state the flip-flops start in, rst is '1' then
+--   Output: rst comes from a flip-flop, so that reset_sync can make the resets of other clocks from it
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- reset_sync: the reset of one clock, made from an asynchronous one.
---   Begin : rst rises with arst, even when clk stands still
+-- reset_sync: makes the synchronous reset of one clock from an asynchronous one.
+--   Begin : rst rises with arst, even while clk stands still
 --   End   : rst falls with the third rising edge of clk after arst has fallen, so that all flip-flops of the clock see
 --           it fall in the same clock. If arst falls in the recovery time of the first flip-flop, one clock later.
 --   Tools : ASYNC_REG keeps the flip-flops together (constraints/crossings.md)

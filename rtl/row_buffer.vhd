@@ -1,28 +1,29 @@
 -- SPDX-License-Identifier: Apache-2.0
--- row_buffer: pixel pairs of one tile, written in chunks of any order, read in raster order (docs/protocol.md, 'Data').
---   Window   : chunks base .. base+G_SLOTS-1 have a place; chunk c lies in slot c mod G_SLOTS. A chunk is free again
---              with the reading of its last pair. G_SLOTS >= open_chunks: nothing is ever written over
+-- row_buffer: collects the pixel pairs of one tile, written in chunks of any order, read in raster order
+--             (docs/protocol.md, 'Data').
+--   Window   : chunks base .. base+G_SLOTS-1 have a place; chunk c lies in slot c mod G_SLOTS. A chunk is freed when
+--              its last pair is read. With G_SLOTS >= open_chunks nothing is ever overwritten
 --   Layout   : pair p of slot s at word p * G_SLOTS + s. So a chunk's address starts with its slot number and grows
 --              by G_SLOTS: no product anywhere, for any G_SLOTS and G_CHUNK_PAIRS
 --   Bits     : one per chunk ("is there"), number c mod 2^clog2(G_SLOTS), in a RAM of three copies, one for each
 --              reader: the check of a new chunk, the status bitmap, the output. Zero outside the window
---   Writing  : w_check (not in the clock of a w_commit), answer two clocks later, the same until the next w_check
---              (clear and open_tile take w_new back). Then G_CHUNK_PAIRS * C_PAIR_BYTES bytes, {left, right} big
---              endian, then w_commit. w_repeated holds for consumed chunks of a finished tile, too
+--   Writing  : w_check (not in the clock of a w_commit) is answered two clocks later, until the next w_check (clear and
+--              open_tile withdraw w_new). Then follow G_CHUNK_PAIRS * C_PAIR_BYTES bytes, {left, right} big endian, and
+--              w_commit. w_repeated is also true for consumed chunks of a finished tile
 --   Bitmap   : b_bit shows b_index two clocks later, index 0 being the base. While b_hold no chunk ends, so that base,
 --              received and all bits read meanwhile are of one moment (the output waits at the end of its chunk).
 --              Without it a bit that changes in between is old or new ('X' in simulation in the clock of its reading)
---   Output   : a pair per clock while chunks are there; one clock late if the last pair of a chunk is due in the
+--   Output   : one pair per clock while chunks are there; one clock late if the last pair of a chunk is due in the
 --              clock of a w_check or w_commit. m_tdata has left in the low half. First pair 3 clocks after go
 --   busy     : from open_tile until the last pair is taken and all bits are zero again (2^clog2(G_SLOTS) clocks after
 --              it was read); after clear and after reset the same number of clocks
---   complete : before go: all chunks of the tile or all slots are full. After go it means nothing
+--   complete : before go: all chunks of the tile or all slots are full. After go it has no meaning
 --   clear    : obeyed in every clock; a pair on m_* vanishes
 --   fail     : the launched tile has failed in the engine: if its rows, or its last pair, are still here, as clear.
 --              Rows of the next tile stay
 --   staged   : from the clock after open_tile until go
 --   Upsets   : idle, clearing, staged and running differ in two bits. Any other code, and a chunk whose last pair was
---              not read from the slot of base: as clear, and recovered for a clock. A tile that was inside is lost
+--              not read from the slot of base, act as clear and set recovered for one clock. A tile inside is lost
 --   Golden   : sw/golden/row_buffer.hpp
 library ieee;
   use ieee.std_logic_1164.all;

@@ -1,15 +1,16 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- scheduler: keeps the job words of the tile in the row buffer, and launches it when its rows are complete and the
 --            engine is idle.
---   Launch    : 18 register writes, one a clock, in the order of START (docs/protocol.md), then COMMAND = 1 together
+--   Launch    : 18 register writes, one per clock, in the order of START (docs/protocol.md), then COMMAND = 1 together
 --               with go, running and run_tile. 20 clocks from the condition to go
---   running   : until map_last; or, if engine_busy falls without it, the tile has failed (refused or dropped): failed
---               and failed_tile hold until stop, tile_failed is '1' for their first clock
---   Watch     : for 16 clocks on end the engine has not begun after the start, or asks for pixels where there are none
---               (starved), or is busy though nothing was launched: COMMAND = 2 (abort), and a running tile has failed
---   Lost      : a buffer was found in a state that cannot be, and has forgotten what it held: the running or else the
---               latest tile has failed, COMMAND = 2. So it is if the launch itself is disturbed
---   Upsets    : the states differ in two bits; any other code is as lost. recovered: '1' for a clock with each of these
+--   running   : until map_last. If engine_busy falls without it, the tile has failed (refused or dropped): failed and
+--               failed_tile hold until stop, tile_failed is '1' in their first clock
+--   Watch     : if for 16 clocks in a row the engine has not begun after the start, or asks for pixels where there are
+--               none (starved), or is busy though nothing was launched: COMMAND = 2 (abort), and a running tile has
+--               failed
+--   Lost      : a buffer was found in an illegal state and has forgotten its contents: the running or else the latest
+--               tile has failed, COMMAND = 2. The same applies if the launch itself is disturbed
+--   Upsets    : the states differ in two bits; any other code acts as lost. recovered is '1' for a clock with each
 --   Job words : job_addr 0..17, written while no tile is staged, in any order; they survive a launch
 --   Table     : t_* go to cfg_* in the same clock; only while nothing is staged or running,
 --               and not in the clock after stop

@@ -1,20 +1,21 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- similarity: MNCC of the left and right samples over G_WINDOW x G_WINDOW windows (paper, section 4.2.2, equation 1).
 --   Method  : V = 2 (n S(lr) - S(l) S(r)) / (n S(l^2 + r^2) - S(l)^2 - S(r)^2), n = M*M, S over the window: twice the
---             covariance over the sum of the variances. Offsets of l and r, and the sign of r together with that of V's
---             numerator, change nothing, so the circuit takes l' = l - 2^(S-1) and r' = 2^(S-1) - 1 - r: bits inverted.
---             Per column the sums of l', r', x = l'r' and y = l'^2 + r'^2 over the last M rows are kept in one RAM; a
---             new sample changes them by new - old: with a = l' - l'old and c = r' - r'old, dx = a r' + l'old c and
---             dy = a (l' + l'old) + c (r' + r'old). Window sums follow from column sums likewise, as running sums.
---             Nothing grows with M but RAM depth.
---   Divider : G_DIVIDER = 0 is divider, one bit a stage; 1 is divider_mul, three products. Same results and latency
+--             covariance over the sum of the variances. An offset of l or r changes nothing, and a mirrored r only the
+--             sign of the covariance, so the circuit uses l' = l - 2^(S-1) and r' = 2^(S-1) - 1 - r: bits inverted. For
+--             each column one RAM keeps the sums of l', r', x = l'r' and y = l'^2 + r'^2 over the last M rows; a new
+--             sample changes them by new - old: with a = l' - l'old and c = r' - r'old, dx = a r' + l'old c and
+--             dy = a (l' + l'old) + c (r' + r'old). Window sums follow from column sums in the same way, as running
+--             sums. M only affects the depth of a RAM and a few bits of the sums.
+--   Divider : G_DIVIDER = 0 is divider, one bit per stage; 1 is divider_mul, three products. Same results and latency
 --   Split   : G_SPLIT = 1 multiplies the differences of x and y by n in two parts each, for devices whose multipliers
 --             have 18 x 18 bits. Same results and latency
 --   Slices  : every product is followed by the one sum that uses it, both registered, so that they fit the multiplier
 --             and adder of one DSP slice: column sums of x and y are chains of two, n S(x) and n S(y) accumulate their
 --             own multiples, the squares are added to them; l' + l'old fits the adder before a multiplier. Nine slices.
---             Accumulators of slices begin with 0. The -1 that makes an inverted denominator of a negative one is in
---             S(l)^2 - 1 = (S(l) + 1)(S(l) - 1): S(l) - 1 is accumulated, the adder before the multiplier adds 2
+--             Accumulators of slices begin with 0, as far as tools infer them. The -1 of an inverted denominator is in
+--             S(l)^2 - 1 = (S(l) + 1)(S(l) - 1): S(l) - 1 is accumulated in LUTs, the adder before the multiplier adds
+--             2
 --   Rate    : one sample per clock; cells leave in raster order
 --   Latency : similarity_latency(G_MNCC_W) clocks from the last sample of a window to its cell (psweep_pkg)
 --   Numbers : samples ufix(G_SAMPLE_W,0); all sums exact; operands of the division truncated to G_MNCC_W+3 bits, the

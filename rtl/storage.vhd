@@ -1,20 +1,20 @@
 -- SPDX-License-Identifier: Apache-2.0
--- storage: the loaded windows of both images, four banks each, interleaved by the parities of x and y, so that any
---          2x2 neighbourhood is read in one clock (paper, section 4.2.1, equation 2).
+-- storage: holds the loaded windows of both images in four banks each, interleaved by the parities of x and y, so that
+--          any 2x2 neighbourhood is read in one clock (paper, section 4.2.1, equation 2).
 --   Rate     : one sample (2x2 pixels of each image) per lane and clock; writes: one pixel of each image per clock
 --   Latency  : C_STORAGE_LATENCY = 4 clocks from s_* to m_*
---   Lanes    : bundles hold lane 0 in the low bits. A block RAM has two ports, and nobody writes while a tile is swept:
+--   Lanes    : vectors hold lane 0 in the low bits. A block RAM has two ports, and nothing is written in a sweep:
 --              lanes 0 and 1 read the same banks, each through its own port, any sample at any time (ram_2r). Lanes 2
 --              and 3 have a second copy. So two lanes need no more RAM than one, and no lane depends on where another
 --              reads
 --   Address  : (y div 2) * G_IMG_COLS/2 + x div 2, whatever was loaded; the row part comes from address_generator. With
---              lanes that write and read through one port a pixel is written a clock later, and then the row part must
---              be 0 and no sample come
---   Rectified: G_RECTIFIED = 1: samples lie on rows of pixels; two banks an image, by the parity of x, hold all rows:
---              y * G_IMG_COLS/2 + x div 2. Same RAM, but half the addresses and a 2:1 choice of pixels. p01, p11 are 0
---   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W) passed through
---   Unusable : a sample that is not usable in x and y reads address 0; its pixels mean nothing
---   Reset    : clears m_valid's way; memories and data have no reset
+--              several lanes, which write and read through one port, a pixel is written one clock later; the row part
+--              must then be 0 and no sample may come
+--   Rectified: with G_RECTIFIED = 1 samples lie on rows of pixels; two banks per image, by the parity of x, hold all
+--              rows: y * G_IMG_COLS/2 + x div 2. Same RAM, half the addresses, 2:1 selection of pixels. p01, p11 are 0
+--   Numbers  : pixels ufix(G_PIX_W,0), fractions ufix(0,G_WEIGHT_W), passed through
+--   Unusable : a sample that is not usable in x and y reads address 0; its pixels are undefined
+--   Reset    : clears the valids; memories and data have no reset
 --   Golden   : sw/golden/storage.hpp
 library ieee;
   use ieee.std_logic_1164.all;

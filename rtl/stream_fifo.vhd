@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- stream_fifo: some places between a pipeline that cannot stop at once and a stream; cuts every path between them.
+-- stream_fifo: a small FIFO between a pipeline that cannot stop at once and a stream; cuts every path between them.
 --   Rate     : one beat per clock in and out
 --   Latency  : 2 clocks; 2 ** G_DEPTH_LOG2 - 1 places
 --   Contract : m_tvalid never waits for m_tready; a beat shown on m_* holds until it is taken (or reset)
---   few      : a clock ago less than half of the places were taken. Who begins beats only while few = '1' and needs at
---              most 2 ** (G_DEPTH_LOG2 - 1) - 2 clocks from there to s_tvalid need not look at s_tready
+--   few      : one clock ago less than half of the places were taken. A sender that begins beats only while few = '1'
+--              and needs at most 2 ** (G_DEPTH_LOG2 - 1) - 2 clocks from there to s_tvalid need not look at s_tready
 --   Reset    : all places become empty; data have no reset
---   Why so   : a RAM read at the place that will be shown next: a beat that is not taken is read again. Two pointers
---              and a memory of LUTs are smaller than two registers a bit, and no enable lies before all of them
+--   Structure: a RAM is read at the place that will be shown next, so a beat that is not taken is read again. Two
+--              pointers and a LUT RAM are smaller than two registers per bit, and no enable lies before all of them
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;

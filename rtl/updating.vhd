@@ -2,11 +2,11 @@
 -- updating: the depth map: winner takes all, local maximum, parabola, unload (paper, section 4.2.3).
 --   Cell    : {best, prev, plane, frac, local_max, prev_valid}, 2 G_MNCC_W + clog2(G_PLANES) + G_FRAC_W + 2 bits in one
 --             RAM. Two values of V suffice (the best and the one before it); the fraction of the parabola is computed
---             when the plane behind the best one comes by, and stored instead of a third.
+--             when the plane after the best one passes, and stored instead of a third.
 --   Rate    : one cell per clock: read, change, write; unload: one cell per clock while m_tready = '1'
---   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage a
---             lane in the order of planes, and is written once. Of the parabolas due in a set only the last one counts
---             (a better V later in the set voids those before it), so there is one divider
+--   Lanes   : a set of G_LANES planes comes at once, lane 0 in the low bits. The cell is read once, passes one stage
+--             per lane in the order of planes, and is written once. Of the parabolas due in a set only the last one
+--             counts (a better V later in the set voids those before it), so there is one divider
 --   Latency : updating_latency(G_FRAC_W, G_LANES) clocks from a cell's V to its write (psweep_pkg); unload 5 clocks to
 --             the first beat
 --   Numbers : V ufix(0,G_MNCC_W); fraction a / (a + c) = offset + 1/2, ufix(0,G_FRAC_W), truncated
@@ -15,7 +15,9 @@
 --             plane there; lane 0 always has one
 --   Mask    : bit 0 outside, 1 no variance, 2 below threshold, 3 not a local maximum; while a cell has no winner, the
 --             low bits of its fraction remember whether it was ever inside (0) and textured (1)
---   Reset   : and cancel: valids, counters; the map keeps its contents
+--   Unload  : cells are read only while the FIFO behind is less than half full, and the RAM's address comes straight
+--             from a counter, so that m_tready does not reach the blocks of the map
+--   Reset   : as cancel: clears valids and counters; the map keeps its contents
 --   Golden  : sw/golden/updating.hpp
 library ieee;
   use ieee.std_logic_1164.all;

@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The one reader of configurations: rtl/configs/{engine,chip}.schema.json and the JSON files beside them.
 
@@ -12,17 +13,15 @@
   --kind engine|chip, --json (list, show, generics), --build FOLDER (default build)
 
 A key that is left out takes the schema's default. Users' own configurations lie in build/configs and build/chips.
-Exit code 2 and one line with file and key if something is wrong."""
-from __future__ import annotations
-
+Python 3.6 and later, without packages: the vendors' tools bring their own. Exit code 2 and one line with file and key
+if something is wrong."""
 import argparse
 import functools
 import json
 import pathlib
 import re
 import sys
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CONFIGS = ROOT / "rtl" / "configs"
@@ -36,23 +35,22 @@ class ConfigError(Exception):
     """Names file and key."""
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """A generic: its key, range and meaning."""
     key: str
     generic: str
     default: int
     meaning: str
     lowest: int
-    highest: int | None
-    allowed: tuple[int, ...]  # empty: all from lowest to highest
+    highest: Optional[int]
+    allowed: Tuple[int, ...]  # empty: all from lowest to highest
     multiple: int
     odd: bool
-    forbidden: int | None
+    forbidden: Optional[int]
     role: str  # size: the request must fit; format: decides bits of the results; build: neither
     info: int  # word of the INFO message, 0: none
-    asserted: tuple[str, ...]  # entity.generic that checks it; empty: all of its name
-    derived: int | None  # value for 'follows from the others', which the asserting entity never sees
+    asserted: Tuple[str, ...]  # entity.generic that checks it; empty: all of its name
+    derived: Optional[int]  # value for 'follows from the others', which the asserting entity never sees
 
     def range(self) -> str:
         """In the words of messages and pages."""
@@ -76,30 +74,29 @@ class Field:
                 and value % self.multiple == 0 and not (self.odd and value % 2 == 0) and value != self.forbidden)
 
 
-@dataclass(frozen=True)
-class Configuration:
+class Configuration(NamedTuple):
     """One JSON file, defaults filled in."""
     kind: str
     name: str
     path: pathlib.Path
     description: str
     waves: bool
-    values: dict[str, int]  # by key, in the order of the schema
-    engine: Configuration | None  # of a chip
+    values: Dict[str, int]  # by key, in the order of the schema
+    engine: Optional["Configuration"]  # of a chip
 
-    def generics(self) -> dict[str, int]:
+    def generics(self) -> Dict[str, int]:
         """All of the entity, the engine's first."""
         own = {field.generic: self.values[field.key] for field in fields(self.kind)}
         return {**self.engine.generics(), **own} if self.engine else own
 
 
-def schema(kind: str) -> dict[str, Any]:
+def schema(kind: str) -> Dict[str, Any]:
     """The schema as it stands in the file."""
     return json.loads((CONFIGS / f"{kind}.schema.json").read_text())
 
 
 @functools.lru_cache(maxsize=None)
-def fields(kind: str) -> tuple[Field, ...]:
+def fields(kind: str) -> Tuple[Field, ...]:
     """The generics of a kind in the order of the schema."""
     found = []
     for key, about in schema(kind)["properties"].items():
@@ -150,10 +147,10 @@ def read(path: pathlib.Path, kind: str, build: pathlib.Path) -> Configuration:
     return Configuration(kind, path.stem, path, content["description"], content.get("waves", False), values, engine)
 
 
-def files(kind: str, build: pathlib.Path, own_only: bool = False) -> dict[str, pathlib.Path]:
+def files(kind: str, build: pathlib.Path, own_only: bool = False) -> Dict[str, pathlib.Path]:
     """All configurations by name, those of the build folder last; a name may stand once."""
     folder, user, _ = KINDS[kind]
-    found: dict[str, pathlib.Path] = {}
+    found: Dict[str, pathlib.Path] = {}
     for place in ([] if own_only else [CONFIGS / folder]) + [build / user]:
         for path in sorted(place.glob("*.json")):
             if path.stem in found:
@@ -173,7 +170,7 @@ def find(name: str, kind: str = "engine", build: pathlib.Path = ROOT / "build") 
 
 # For CMake and C++ ----------------------------------------------------------------------------------------------------
 def cmake_text(build: pathlib.Path, own: bool) -> str:
-    """PSWEEP_<KIND>_NAMES: all; for each PSWEEP_<KIND>_<name>_{FILE,DESCRIPTION,WAVES,GENERICS,VALUES,KEYS}. VALUES: C++
+    """PSWEEP_<KIND>_NAMES: all; for each PSWEEP_<KIND>_<name>_{FILE,DESCRIPTION,WAVES,GENERICS,VALUES}. VALUES: C++
     that assigns to members of c; of a chip also _ENGINE and _ENGINE_VALUES."""
     lines = ["# Written by scripts/configurations.py."]
     for kind in KINDS:
@@ -186,12 +183,12 @@ def cmake_text(build: pathlib.Path, own: bool) -> str:
                      "GENERICS": ";".join(f"{generic}={value}" for generic, value in config.generics().items()),
                      "VALUES": _assignments(config.values)}
             if config.engine:
-                about |= {"ENGINE": config.engine.name, "ENGINE_VALUES": _assignments(config.engine.values)}
+                about.update({"ENGINE": config.engine.name, "ENGINE_VALUES": _assignments(config.engine.values)})
             lines += [f"set(PSWEEP_{upper}_{name}_{key} [==[{value}]==])" for key, value in about.items()]
     return "\n".join(lines) + "\n"
 
 
-def _assignments(values: dict[str, int]) -> str:
+def _assignments(values: Dict[str, int]) -> str:
     return "".join(f"  c.{key} = {value};\n" for key, value in values.items())
 
 
@@ -257,16 +254,16 @@ _ASSERT = re.compile(r"^\s*assert ((?:[^;]|\n)*?)\s*report \"(\w+): (G_\w+)\"", 
 _BOUND = re.compile(r"(G_\w+) (>=|<=|=|/=|mod) (\d+)(?: = (\d+))?")
 
 
-def vhdl_limits(text: str) -> dict[str, list[tuple[str, int, int]]]:
+def vhdl_limits(text: str) -> Dict[str, List[Tuple[str, int, int]]]:
     """What the assertions of an entity ask of its generics: operator, number, and the remainder of a mod."""
-    found: dict[str, list[tuple[str, int, int]]] = {}
+    found: Dict[str, List[Tuple[str, int, int]]] = {}
     for match in _ASSERT.finditer(re.sub(r"--.*", "", text)):
         for generic, operator, number, rest in _BOUND.findall(match[1]):
             found.setdefault(generic, []).append((operator, int(number), int(rest or 0)))
     return found
 
 
-def _agrees(field: Field, limits: list[tuple[str, int, int]]) -> bool:
+def _agrees(field: Field, limits: List[Tuple[str, int, int]]) -> bool:
     """Do the assertions let pass just what the schema does? Tried at and around all numbers that either names."""
     equal = {number for operator, number, _ in limits if operator == "="}
 
@@ -280,20 +277,22 @@ def _agrees(field: Field, limits: list[tuple[str, int, int]]) -> bool:
         return all(tests[operator](number, rest) for operator, number, rest in limits)
 
     numbers = {n for operator, n, _ in limits if operator != "mod"} | {field.lowest, *field.allowed}
-    numbers |= {field.highest} if field.highest is not None else set()
+    if field.highest is not None:
+        numbers.add(field.highest)
     return all(passes(value) == field.holds(value) for n in numbers for value in range(n - 2, n + 3))
 
 
-def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> list[str]:
+def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> List[str]:
     """All that is wrong, a line each."""
-    found: list[str] = []
+    found: List[str] = []
     sources = {path.stem: path.read_text() for path in rtl.rglob("*.vhd")}
     declared = re.compile(r"^\s*(G_\w+)\s*:\s*integer\s*:=\s*(-?\d+)", re.M)
     info = {int(word): value for word, value in
             re.findall(r"v_words\((\d+)\)\s*:=\s*std_logic_vector\(to_unsigned\((G_\w+), 32\)\)", sources["responder"])}
-    seen: set[str] = set()
+    seen = set()
     for kind, (folder, _, entity) in KINDS.items():
-        block = re.search(rf"entity {entity} is\s*generic \((.*?)\);\s*port", re.sub(r"--.*", "", sources[entity]), re.S)
+        text = re.sub(r"--.*", "", sources[entity])
+        block = re.search(rf"entity {entity} is\s*generic \((.*?)\);\s*port", text, re.S)
         generics = {name: int(value) for name, value in declared.findall(block[1] if block else "")}
         for field in fields(kind):
             where = f"rtl/configs/{kind}.schema.json: {field.key}"
@@ -330,7 +329,7 @@ def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> lis
 
 
 # Command line ---------------------------------------------------------------------------------------------------------
-def new(arguments: list[str], build: pathlib.Path) -> pathlib.Path:
+def new(arguments: List[str], build: pathlib.Path) -> pathlib.Path:
     """KEY=n .. of make config (in capitals or not) -> build/configs/<NAME>.json."""
     given = {}
     for argument in arguments:
@@ -342,7 +341,7 @@ def new(arguments: list[str], build: pathlib.Path) -> pathlib.Path:
     name = given.pop("name", "")
     if not NAME.fullmatch(name):
         raise ConfigError(f"make config: NAME='{name}' must consist of a-z, 0-9 and _, and begin with a letter")
-    values: dict[str, Any] = {}
+    values: Dict[str, Any] = {}
     for key, value in given.items():
         if not re.fullmatch(r"-?\d+", value):
             raise ConfigError(f"make config: {key.upper()}='{value}' is not a whole number")
@@ -351,7 +350,7 @@ def new(arguments: list[str], build: pathlib.Path) -> pathlib.Path:
     disparity = values.pop("disparity", 90)
     if not 0 <= disparity <= 4096:
         raise ConfigError(f"make config: DISPARITY={disparity} must be 0 .. 4096")
-    content: dict[str, Any] = {"description": "added by make config"}
+    content: Dict[str, Any] = {"description": "added by make config"}
     by_key = {field.key: field for field in fields("engine")}
     for key in values:
         if key not in by_key and key != "waves":
@@ -381,7 +380,7 @@ def write_if_different(path: pathlib.Path, text: str) -> None:
         path.write_text(text)
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: List[str]) -> int:
     """Exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("command", choices=["check", "list", "show", "generics", "new", "cmake", "header"])

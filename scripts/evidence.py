@@ -8,6 +8,7 @@
                                                       stamps what the latest run of a kind left in build/; --at: it was
                                                       made of the sources of that commit
   scripts/evidence.py blocks [--check]                writes the blocks of the pages from docs/evidence/*.json
+  scripts/evidence.py full [FILE]                     the complete tables as one page: build/evidence/full.md
   scripts/evidence.py lint                            are all figures in blocks, are the blocks what they should be?
                                                       Stale ones are named, which is no failure
 
@@ -46,6 +47,13 @@ def _blocks(check: bool) -> int:
     return 1 if found.wrong else 0
 
 
+def _full(files: list[str]) -> int:
+    out = pathlib.Path(files[0]) if files else sources.ROOT / "build" / "evidence" / "full.md"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(pages.full(runner.all_status()))
+    return 0
+
+
 def _lint() -> int:
     status = runner.all_status()
     found = pages.check(status, False)
@@ -68,7 +76,7 @@ def _lint() -> int:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("status", "run", "stamp", "blocks", "lint"))
+    parser.add_argument("what", choices=("status", "run", "stamp", "blocks", "full", "lint"))
     parser.add_argument("kinds", nargs="*", metavar="KIND")
     parser.add_argument("--strict", action="store_true")
     parser.add_argument("--force", action="store_true")
@@ -76,6 +84,8 @@ def main() -> int:
     parser.add_argument("--at", default="", metavar="COMMIT")
     options = parser.parse_args()
     try:
+        if options.what == "full":
+            return _full(options.kinds)
         kinds = manifest.chosen(options.kinds) if options.kinds else list(manifest.KINDS)
         if options.what == "status":
             return _status(kinds, options.strict)

@@ -3,7 +3,8 @@
 # Installs the Debian packages of scripts/packages.txt that are missing, and nothing else.
 #
 #   scripts/setup.sh [--check | --list] [GROUP ...]   groups: build (default), lint, formal, gates, opinion,
-#                                                     net, wire, waves, plots, cost, flows, sta, dse, evidence
+#                                                     net, wire, waves, plots, cost, flows, sta, dse, docs,
+#                                                     evidence
 #     --check  install nothing, name what is missing (exit code 1 if anything is)
 #     --list   print the package names
 #
@@ -24,17 +25,18 @@ for arg in "$@"; do
     --check) mode=check ;;
     --list) mode=list ;;
     -h | --help) usage; exit 0 ;;
-    build | lint | formal | gates | opinion | net | wire | waves | plots | cost | flows | sta | dse | evidence)
+    build | lint | formal | gates | opinion | net | wire | waves | plots | cost | flows | sta | dse | docs | \
+      evidence)
       groups+=("$arg") ;;
     *) die "unknown argument '$arg'; see scripts/setup.sh --help" ;;
   esac
 done
 [ ${#groups[@]} -gt 0 ] || groups=(build)
-# Groups cost and dse have Python packages besides, in virtual environments.
+# Groups cost, dse and docs also have Python packages, in virtual environments.
 finish() {
   local group check=()
   [ "$mode" != check ] || check=(--check)
-  for group in cost dse; do
+  for group in cost dse docs; do
     case " ${groups[*]} " in *" $group "*) "scripts/$group/venv.sh" "${check[@]}" || exit 1 ;; esac
   done
   exit 0

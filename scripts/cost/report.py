@@ -10,10 +10,28 @@
   scripts/cost/report.py --update            measures all and writes baseline.json, the tables of docs/cost.md and
                                              docs/datasheet.md, docs/images/cost.svg
   scripts/cost/report.py --pages [--check]   only writes (compares) the pages from baseline.json
+  scripts/cost/report.py --full [FILE]       the complete tables as one page: build/cost/full.md
   scripts/cost/report.py --pnr               place and route into baseline.json and the pages (half an hour)
 
-Everything is written to build/cost/ as JSON (fields: docs/cost.md), with the plot cost.svg. JOBS: measurements at once.
-COST_PROGRAMS: folder of shape_table and link_table (default build).
+Everything is written to build/cost/ as JSON, with the plot cost.svg. JOBS: measurements at once. COST_PROGRAMS: folder
+of shape_table and link_table (default build).
+
+Fields of the JSON, which scripts/cost/measure.py --json writes, too:
+  schema            1
+  entity, unit, family, generics, hierarchy, no_dsp
+                    the question; generics with those by default
+  tool              Yosys and its version
+  counts            lut, ff, ram36, ram18, ram36_equivalent, ram48 (NX_RAM as Yosys maps), rf, dsp, alu, carry, mux,
+                    srl, lutram (cells)
+  cells             primitives by name
+  memories          unit, path, words, bits, reads, writes; nx_ram48, nx_ram48_ecc: blocks of NG-MEDIUM by modes
+  memory_bits       sum of words x bits
+  products          unit; bits of both operands and of the result; signed
+  levels            longest (lut, carry, start, end), by_unit (unit of the end), histogram (LUTs: ends); flat, not ecp5
+  units             with --hierarchy: counts, cells, instances, longest path of each; "" is what lies between them
+  registers_merged  FF that became a block's own
+  signed_products_repaired, seconds, cached
+                    of this run
 """
 import argparse
 import json
@@ -36,7 +54,7 @@ from points import (BITS, NG_MEDIUM, PAPER_ALL, PAPER_CLOCKS, PAPER_UNITS, PEERS
 
 OUT = cost.ROOT / "build" / "cost"
 BASELINE = cost.HERE / "baseline.json"
-PAGES = [cost.ROOT / "README.md", *sorted((cost.ROOT / "docs").glob("*.md"))]
+PAGES = [cost.ROOT / "README.md", *sorted((cost.ROOT / "docs").rglob("*.md"))]
 PICTURE = cost.ROOT / "docs" / "images" / "cost.svg"
 FAMILY_NAMES = {"xc6v": "Virtex-6", "xc5v": "Virtex-5", "ecp5": "ECP5", "ng_medium": "NG-MEDIUM"}
 # The same RTL gives the same counts with the same tools; another GHDL writes other Verilog for the same circuit, and
@@ -194,7 +212,7 @@ def nx_rows(memories):
     return sum(m["nx_ram48"] for m in blocks), sum(m["nx_ram48_ecc"] for m in blocks)
 
 
-def table_families(base):
+def table_families(base, complete=False):
     rows = []
     for name, point in POINTS.items():
         for family in families.FAMILIES:
@@ -202,14 +220,20 @@ def table_families(base):
             if not found or family == "xc6v" and len(base["points"][name]) == 1 or name.startswith("G_"):
                 continue
             c = found["counts"]
+            if not complete and (name == "tile_split" or point["title"].startswith("unit ")):
+                continue
             ram = num(c["ram36_equivalent"]) + " RAMB36"
             if family == "ng_medium":
-                ram = f"{c['ram48']} RAMB48 ({nx_rows(found['memories'])[0]} by modes)"
+                ram = f"{nx_rows(found['memories'])[0]} RAMB48"
+                if complete:
+                    ram += f" by modes, {c['ram48']} by Yosys"
             if family == "ecp5":
                 ram = f"{c['ram18']} DP16KD"
-            rows.append([point["title"], FAMILY_NAMES[family], c["lut"], c["ff"], ram, c["dsp"], c["carry"],
-                         c["srl"] or "", c["lutram"] or c["rf"] or ""])
-    return markdown(["", "family", "LUT", "FF", "RAM", "DSP", "carry", "SRL", "LUT RAM or RF"], rows)
+            rows.append([point["title"], FAMILY_NAMES[family], c["lut"], c["ff"], ram, c["dsp"]])
+            if complete:
+                rows[-1] += [c["carry"], c["srl"] or "", c["lutram"] or c["rf"] or ""]
+    return markdown(["", "family", "LUT", "FF", "RAM", "DSP"] + (
+        ["carry", "SRL", "LUT RAM or RF"] if complete else []), rows)
 
 
 # Engines whose longest paths are told: one, two and four lanes.
@@ -217,6 +241,16 @@ LEVELS = ("bands", "tile", "tile_2", "tile_4")
 
 
 def table_levels(base):
+    """Most LUTs on a path that ends in each unit."""
+    rows = []
+    for name, family in (("bands", "xc6v"), ("bands", "xc5v"), *((name, "xc6v") for name in LEVELS if name != "bands")):
+        found = flat(base, name, family)["levels"]["by_unit"]
+        rows.append([POINTS[name]["title"].split(" (")[0].split(":")[0], FAMILY_NAMES[family],
+                     *(found[unit]["lut"] for unit in PAPER_UNITS)])
+    return markdown(["LUTs on the longest path", "family", *PAPER_UNITS], rows)
+
+
+def table_paths(base):
     rows = []
     for name, family in (("bands", "xc6v"), ("bands", "xc5v"), *((name, "xc6v") for name in LEVELS if name != "bands")):
         found = flat(base, name, family)["levels"]["by_unit"]
@@ -241,7 +275,7 @@ def table_five(base):
         seconds = frame["clocks"] / 300e6
         pds = frame["pixels"] ** 2 * frame["planes"] / seconds
         rows.append([f"ours: {POINTS[name]['title']}", f"{num(c['ram36_equivalent'])} / {c['lut'] / 1000:.1f}K",
-                     f"{pds / 1e6:,.0f} M", f"{pds / c['lut'] / 1000:.0f}K", f"{1 / seconds:.2f}", "this page"])
+                     f"{pds / 1e6:,.0f} M", f"{pds / c['lut'] / 1000:.0f}K", f"{1 / seconds:.2f}", "table above"])
     return markdown(["", "RAMB36 / LUT", "PDS", "PDS / LUT", "frames a second", "source"], rows)
 
 
@@ -258,11 +292,14 @@ def table_bits(base):
 
 
 def table_headline(base):
-    """README.md: the engines beside the paper's."""
+    """docs/datasheet.md: engines and chip beside the paper's."""
     rows = []
     for name, title in (("bands", "44-30-13-13, one plane at once"), ("tile", "256 x 130 tiles, one"),
                         ("tile_2", "256 x 130 tiles, two"), ("tile_4", "256 x 130 tiles, four"),
-                        ("tile_4_mul", "four, the division in DSP slices (`G_DIVIDER`)")):
+                        ("tile_4_mul", "four, division in DSP slices (`G_DIVIDER`)"),
+                        ("tile_rectified", "one, rectified pairs only (`G_RECTIFIED`)"),
+                        ("mbit", "117 x 93 tiles, one"),
+                        ("integer", "1950 x 1950 pixels, 128 integer depths, rectified, two")):
         c, frame = flat(base, name)["counts"], base["frames"][name]
         rows.append([title, f"{c['lut']:,}", f"{c['ff']:,}", num(c["ram36_equivalent"]), c["dsp"],
                      mega(frame["clocks"]), f"{efficiency(frame, c['lut']):.2f}"])
@@ -271,8 +308,12 @@ def table_headline(base):
             rows.append(["the paper's, 44-30-13-13 (ISE 14.7)", f"{lut:,}", f"{ff:,}", ram, dsp,
                          f"{PAPER_CLOCKS / 1e6:.0f}",
                          f"{frame['useful'] / PAPER_CLOCKS / (lut / 1000):.2f}"])
-    return markdown(
-        ["engine, Virtex-6", "LUT", "FF", "RAMB36", "DSP", "M clocks", "evaluations a clock and kLUT"], rows)
+    for name, title in (("arbiter", "MAC, stack, arbiter, smallest buffers (the paper's: 3K LUT)"),
+                        ("arbiter_double", "the same, both buffers of 44-30-13-13 (the paper's: 3K LUT, 55 RAMB36)"),
+                        ("chip", "whole chip, 256 x 130 tiles, one lane")):
+        c = flat(base, name)["counts"]
+        rows.append([title, f"{c['lut']:,}", f"{c['ff']:,}", num(c["ram36_equivalent"]), c["dsp"], "", ""])
+    return markdown(["Virtex-6", "LUT", "FF", "RAMB36", "DSP", "M clocks", "efficiency"], rows)
 
 
 def table_changes(base):
@@ -289,6 +330,17 @@ def table_changes(base):
     head = markdown(["changed", "from", "to", "LUT", "FF", "RAMB36", "DSP"], rows)
     return (f"`tile`: {start['lut']} LUT, {start['ff']} FF, {num(start['ram36_equivalent'])} RAMB36, {start['dsp']} "
             f"DSP48E1.\n\n{head}")
+
+
+def table_nx(base):
+    """Blocks by unit."""
+    units = {}
+    for m in flat(base, "chip_ng", "ng_medium")["memories"]:
+        if m["words"] > 64:
+            units.setdefault(m["unit"] or "frames of packet_tx", []).append(m)
+    rows = [[unit, sum(m["nx_ram48"] for m in ms), sum(m["nx_ram48_ecc"] for m in ms)] for unit, ms in units.items()]
+    return markdown(["unit", "RAMB48 without ECC", "with ECC"],
+                    [*rows, ["all", *nx_rows(flat(base, "chip_ng", "ng_medium")["memories"])]])
 
 
 def table_nx_rams(base):
@@ -358,6 +410,16 @@ def table_targets(base):
 
 
 def table_pnr(base):
+    rows = []
+    for name in PNR:  # units: complete tables
+        r = base.get("pnr", {}).get(name)
+        if r:
+            rows.append([PNR[name][0], f"{r['best']:.1f}", f"{r['median']:.1f}",
+                         *(r["used"].get(k, 0) for k in ("TRELLIS_COMB", "TRELLIS_FF", "DP16KD", "MULT18X18D"))])
+    return markdown(["ECP5-85, speed 8", "best, MHz", "median", "LUT4", "FF", "DP16KD", "MULT18"], rows)
+
+
+def table_pnr_full(base):
     order = [*cost.ENGINE_UNITS, *PNR]
     return pnr.table({name: base["pnr"][name] for name in order if name in base.get("pnr", {})})
 
@@ -372,23 +434,17 @@ COUNTS = ["LUT", "FF", "RAMB36", "DSP"]
 
 
 def table_decisions(base):
-    """docs/architecture.md: what was decided for, beside what was not."""
+    """Alternatives of docs/architecture.md, and units beside the paper's."""
     def times(number, title):
         c = flat(base, "tile")["counts"]
         return [title, *(num(number * c[k]) for k in ("lut", "ff", "ram36_equivalent", "dsp")), ""]
-    rows = [row_of(base, "bands of 30 rows", "bands"), row_of(base, "tiles of 256 x 130", "tile"),
-            row_of(base, "tiles of 117 x 93", "mbit"),
-            row_of(base, "two lanes", "tile_2"), times(2, "two engines"),
-            row_of(base, "four lanes", "tile_4"), times(4, "four engines"),
-            row_of(base, "four lanes, MNCC divided in products", "tile_4_mul"),
-            row_of(base, "one lane, rectified", "tile_rectified"),
+    rows = [times(2, "two engines"), times(4, "four engines"),
             row_of(base, "similarity of the bands, rows of 1104 samples", "similarity"),
             ["the paper's similarity", *PAPER_UNITS["similarity"], ""],
             row_of(base, "similarity of `tile`, rows of 268 samples", "similarity_tile"),
             row_of(base, "divider of 16 bits, 13 bits of quotient", "entity_divider"),
-            row_of(base, "divider in products, 13 bits of quotient", "entity_divider_mul"),
-            row_of(base, "MAC, stack and arbiter, smallest buffers", "arbiter")]
-    return markdown(["Virtex-6", *COUNTS, "M clocks"], rows)
+            row_of(base, "divider in products, 13 bits of quotient", "entity_divider_mul")]
+    return markdown(["Virtex-6", *COUNTS], [row[:5] for row in rows])
 
 
 def table_rectified(base):
@@ -406,32 +462,33 @@ def table_division(base):
 
 
 def table_arbiter(base):
-    """docs/arbiter.md: its entities, and what they add up to."""
-    names = ("mac_rx", "async_fifo", "packet_rx", "responder", "packet_tx", "ram_dc", "mac_tx", "counters", "scheduler",
-             "row_buffer", "map_buffer")
-    rows = [row_of(base, name, f"entity_{name}", False)[:5] for name in names]
-    rows += [row_of(base, "**all, flat**, generics as by default", "entity_arbiter", False)[:5],
-             row_of(base, "flat, both buffers of 44-30-13-13", "arbiter_double", False)[:5],
-             row_of(base, "flat, smallest buffers: G_ROW_SLOTS = 2, G_MAP_DEPTH = 704", "arbiter", False)[:5],
-             ["the paper's arbiter (section 5.4, Virtex-5QV, ISE 14.7)", 3000, "", 55, ""]]
-    return markdown(["entity, generics as by default", *COUNTS], rows)
+    """docs/arbiter.md; its entities have a line in their own pages."""
+    rows = [row_of(base, "default generics", "entity_arbiter", False)[:5],
+            row_of(base, "both buffers of 44-30-13-13", "arbiter_double", False)[:5],
+            row_of(base, "smallest buffers: G_ROW_SLOTS = 2, G_MAP_DEPTH = 704", "arbiter", False)[:5],
+            ["the paper's arbiter (section 5.4, Virtex-5QV, ISE 14.7)", 3000, "", 55, ""]]
+    return markdown(["`arbiter`, flat", *COUNTS], rows)
 
 
-def table_chip(base):
-    """README.md: MAC, stack and arbiter beside the paper's."""
-    rows = []
-    for title, name, paper in (("MAC, stack, arbiter, smallest buffers of rows and map", "arbiter", "3K LUT"),
-                               ("the same with both buffers of 44-30-13-13", "arbiter_double", "3K LUT, 55 RAMB36")):
-        c = flat(base, name)["counts"]
-        rows.append([title, f"{c['lut']:,}", f"{c['ff']:,}", num(c["ram36_equivalent"]), paper])
-    return markdown(["Virtex-6, [docs/cost.md](docs/cost.md)", "LUT", "FF", "RAMB36", "paper"], rows)
+TABLES = {"units": table_units, "families": table_families,
+          "pnr": table_pnr, "changes": table_changes,
+          "headline": table_headline, "rectified": table_rectified,
+          "division": table_division, "arbiter": table_arbiter}
+# Too long for the pages: --full.
+COMPLETE = {"Targets": table_targets, "Engines and entities": table_engines, "Cost of each bit": table_bits,
+            "Beside the paper's table 5 (PDS: pixels x disparities a second, at 300 MHz)": table_five,
+            "Cells of each unit": table_cells, "All families": lambda base: table_families(base, True),
+            "Longest paths by unit": table_levels, "Longest paths": table_paths, "Placed and routed": table_pnr_full,
+            "What was decided against": table_decisions,
+            "NG-MEDIUM: memories by unit": table_nx, "NG-MEDIUM: every memory": table_nx_rams}
 
 
-TABLES = {"engines": table_engines, "units": table_units, "cells": table_cells, "families": table_families,
-          "levels": table_levels, "five": table_five, "bits": table_bits, "nx": table_nx_rams,
-          "targets": table_targets, "pnr": table_pnr, "changes": table_changes,
-          "headline": table_headline, "decisions": table_decisions, "rectified": table_rectified,
-          "division": table_division, "arbiter": table_arbiter, "chip": table_chip}
+def full(base):
+    """The complete tables as one page."""
+    parts = ["# Complete tables of cost", "Written from `scripts/cost/baseline.json`."]
+    for title, make in COMPLETE.items():
+        parts += [f"## {title}", make(base)]
+    return "\n\n".join(parts) + "\n"
 
 
 def cost_line(base, entity):
@@ -689,9 +746,14 @@ def main():
     parser.add_argument("--update", action="store_true")
     parser.add_argument("--pages", action="store_true")
     parser.add_argument("--pnr", action="store_true")
+    parser.add_argument("--full", nargs="?", const=str(OUT / "full.md"))
     parser.add_argument("--rtl", help="another folder instead of rtl/ (--check, --update, --pnr)")
     options = parser.parse_args()
     try:
+        if options.full:
+            pathlib.Path(options.full).parent.mkdir(parents=True, exist_ok=True)
+            pathlib.Path(options.full).write_text(full(baseline()))
+            return 0
         if options.pages:
             number = pages(baseline(), options.check)
             print(f"cost: {number} tables {'are those of baseline.json' if options.check else 'written'}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from evidence import sources
 from evidence.manifest import BY_NAME
 from evidence.records import Record, Status
-from evidence.tables import BLOCKS, wrapped
+from evidence.tables import BLOCKS, FULL, wrapped
 
 _BLOCK = re.compile(r"^<!-- evidence: ([\w.-]+) -->\n(.*?)^<!-- /evidence -->", re.S | re.M)
 # Changes with every edit of the RTL, so it does not count when a block is compared with its results.
@@ -16,7 +16,7 @@ SINCE = re.compile(r"; (?:the RTL has|its sources have) changed since")
 
 
 def page_files(root: pathlib.Path = sources.ROOT) -> list[pathlib.Path]:
-    return [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
 
 
 def kinds_of(block: str) -> tuple[str, ...]:
@@ -40,8 +40,7 @@ def origin(status: Status) -> str:
         return "never measured"
     stamp = status.record.stamp
     at = f"commit {stamp.commit}" + (" with changes of its own" if stamp.edited else "")
-    where = f" ({stamp.date}{', ' + stamp.machine if stamp.machine else ''})"
-    return f"{at}{where}{'' if stamp.passed else ', with failures'}{since(status)}"
+    return f"{at} ({stamp.date}){'' if stamp.passed else ', with failures'}{since(status)}"
 
 
 def generate(block: str, status: dict[str, Status]) -> str:
@@ -53,6 +52,17 @@ def generate(block: str, status: dict[str, Status]) -> str:
         line = "Not measured yet." if not records else f"Measured at {origin(status[kinds[0]])}."
         text = f"{text}\n\n{wrapped(line)}" if text and records else wrapped(line)
     return f"<!-- evidence: {block} -->\n{text}\n<!-- /evidence -->"
+
+
+def full(status: dict[str, Status]) -> str:
+    """The complete tables, as one page."""
+    parts = ["# Complete tables of the evidence", "Written from `docs/evidence/*.json`. The pages show them in short."]
+    for kind, title, make in FULL.values():
+        record = status[kind].record
+        parts.append(f"## {title}")
+        parts += [make(record.results), wrapped(f"Measured at {origin(status[kind])}.")] if record else \
+            ["Not measured yet."]
+    return "\n\n".join(parts) + "\n"
 
 
 def same(a: str, b: str) -> bool:

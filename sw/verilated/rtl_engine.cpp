@@ -32,7 +32,8 @@ std::string build_command(const golden::Config& need) {
   auto even = [](int v) { return v + (v & 1); };
   std::ostringstream text;
   // The name carries the formats as well: two requests must not replace each other's file.
-  text << "make config NAME=w" << need.window << "_" << need.plane_cols << "x" << need.plane_rows << "_p" << need.planes;
+  text << "make config NAME=w" << need.window << "_" << need.plane_cols << "x" << need.plane_rows << "_p"
+       << need.planes;
   for (const auto& field : kEngineFields)
     if (field.role == Role::format && field.value != &EngineFields::window) text << "_" << need.*field.value;
   for (const auto& field : kEngineFields) {

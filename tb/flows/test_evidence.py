@@ -81,6 +81,8 @@ class Stamps(unittest.TestCase):
         for name, (kinds, make) in tables.BLOCKS.items():
             there = {k: found[k] for k in kinds if k in found}
             self.assertEqual(make(there, {k: "" for k in kinds}) != "", bool(there), name)
+        for name, (kind, _, complete) in tables.FULL.items():
+            self.assertIn("|---|", complete(found[kind].results), name)
 
 
 class Pages(unittest.TestCase):
@@ -165,7 +167,8 @@ class Results(unittest.TestCase):
         found = parsers.flips(head + row + whole + tail + (head + row + whole + tail).replace("tiny", "odd_2"))
         self.assertEqual(found["rows"]["state"]["flips"], 576)
         self.assertEqual(found["rows"]["state"]["worst"], {"tiny": 627, "odd_2": 627})
-        self.assertIn("| state | 576 |", tables.flips(found))
+        self.assertIn("| state | 576 |", tables.flips_full(found))
+        self.assertIn("| other registers | 576 |", tables.flips(found))
         with self.assertRaises(parsers.NothingFound):
             parsers.flips("flips: FAILED\n")
 
@@ -179,7 +182,8 @@ class Results(unittest.TestCase):
         self.assertEqual(found["rows"]["mac_tx, slot 2"],
                          {"flips": 9, "masked": 8, "silent": 1, "hang": 0, "clocks": 77})
         self.assertEqual(found["sites"]["silent"], {"`u_row_buffer.used`": 3, "the engine": 1})
-        self.assertIn("`u_row_buffer.used` 3, the engine 1.", tables.flips_chip(found))
+        self.assertIn("`u_row_buffer.used` 3, the engine 1.", tables.flips_chip_full(found))
+        self.assertIn("| MAC | 9 | 8 | 1 |", tables.flips_chip(found))
         with self.assertRaises(parsers.NothingFound):
             parsers.flips_chip("flips_chip: FAILED\n")
 
@@ -190,7 +194,8 @@ class Results(unittest.TestCase):
                 "soak: 1 of 1 configurations, 10 tiles, seed 1, 3 s\n")
         found = parsers.soak(text)
         self.assertEqual((found["rows"]["tiny"]["good"], found["left_in"], found["tiles"]), (9, [1, 2, 3, 4, 5], 10))
-        self.assertIn("| tiny | 10 | 9 |", tables.soak(found))
+        self.assertIn("| tiny | 10 | 9 |", tables.soak_full(found))
+        self.assertIn("1 engines, 10 tiles", tables.soak(found))
         with self.assertRaises(parsers.NothingFound):
             parsers.soak("soak: tiny: FAILED\n")
 
