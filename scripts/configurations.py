@@ -208,7 +208,7 @@ enum class Role { size, format, build };
 // One generic. Legal values: if allowed is not 0, it has a one for each; else lowest .. highest with value mod
 // multiple = rest, and not forbidden.
 template <class Struct>
-struct Field {
+struct Generic {
   const char* key;
   const char* generic;
   const char* meaning;
@@ -238,7 +238,7 @@ def header_text() -> str:
         for f in all_fields:
             text += f"  // {f.generic}: {f.meaning}; {f.range()}\n  int {f.key} = {f.default};\n"
         text += "};\n\n// clang-format off\n"
-        text += f"inline constexpr std::array<Field<{struct}>, {len(all_fields)}> k{struct} = {{{{\n"
+        text += f"inline constexpr std::array<Generic<{struct}>, {len(all_fields)}> k{struct} = {{{{\n"
         for f in all_fields:
             allowed = sum(1 << n for n in f.allowed)
             numbers = (f.lowest, 2147483647 if f.highest is None else f.highest, 2 if f.odd else f.multiple,

@@ -13,7 +13,7 @@ enum class Role { size, format, build };
 // One generic. Legal values: if allowed is not 0, it has a one for each; else lowest .. highest with value mod
 // multiple = rest, and not forbidden.
 template <class Struct>
-struct Field {
+struct Generic {
   const char* key;
   const char* generic;
   const char* meaning;
@@ -65,7 +65,7 @@ struct EngineFields {
 };
 
 // clang-format off
-inline constexpr std::array<Field<EngineFields>, 15> kEngineFields = {{
+inline constexpr std::array<Generic<EngineFields>, 15> kEngineFields = {{
     {"img_cols", "G_IMG_COLS",
      "image buffer, columns",
      "4 .. 4096, even", Role::size, &EngineFields::img_cols, 4, 4096, 2, 0, -1, 0, 1},
@@ -141,7 +141,7 @@ struct ChipFields {
 };
 
 // clang-format off
-inline constexpr std::array<Field<ChipFields>, 11> kChipFields = {{
+inline constexpr std::array<Generic<ChipFields>, 11> kChipFields = {{
     {"clk_khz", "G_CLK_KHZ",
      "clock of the engine in kHz",
      "1000 .. 1000000", Role::build, &ChipFields::clk_khz, 1000, 1000000, 1, 0, -1, 0, 16},
