@@ -163,9 +163,9 @@ bench: setup ## Speed of the float reference, the bit-true model and the simulat
 .PHONY: accuracy
 accuracy: setup ## Float and fixed against the truth, nine scenes, and every number format (half an hour)
 	@scripts/build.sh psweep_accuracy
-	@echo 'accuracy: scenes'; build/sw/eval/experiments/psweep_accuracy --seeds 1,2,3 cleanup fixed rules
-	@echo 'accuracy: unseen'; build/sw/eval/experiments/psweep_accuracy --seeds 11,12,13 cleanup fixed
-	@echo 'accuracy: formats'; build/sw/eval/experiments/psweep_accuracy --seeds 1 formats mncc
+	@echo 'accuracy: scenes'; build/sw/app/psweep_accuracy --seeds 1,2,3 cleanup fixed rules
+	@echo 'accuracy: unseen'; build/sw/app/psweep_accuracy --seeds 11,12,13 cleanup fixed
+	@echo 'accuracy: formats'; build/sw/app/psweep_accuracy --seeds 1 formats mncc
 
 .PHONY: waves
 waves: setup ## Waves of one cell, and its values at every stage   STAGE=similarity CFG=tiny PLANE=6 CELL=8,6

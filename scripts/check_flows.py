@@ -87,8 +87,8 @@ def environment(**more):
 
 def configurations():
     """[(top, configuration)]: all that are named in the repository."""
-    engine = sorted(p.stem for p in (ROOT / "tb" / "configs").glob("*.json"))
-    chip = sorted(p.stem for p in (ROOT / "tb" / "chip" / "configs").glob("*.json"))
+    engine = sorted(p.stem for p in (ROOT / "rtl" / "configs" / "engine").glob("*.json"))
+    chip = sorted(p.stem for p in (ROOT / "rtl" / "configs" / "chip").glob("*.json"))
     chip += sorted({settings["config"] for settings in project.boards().values()} - set(chip))
     return [("psweep", name) for name in engine] + [("psweep_top", name) for name in chip] + [("arbiter", "tile")]
 
@@ -769,7 +769,7 @@ CHECKS = {name[len("check_"):]: value for name, value in list(globals().items())
 # --- faults ---
 
 def copy_tree(to):
-    for folder in ("rtl", "constraints", "scripts", "tb/configs", "tb/chip/configs", "tb/flows"):
+    for folder in ("rtl", "constraints", "scripts", "tb/flows"):
         shutil.copytree(str(ROOT / folder), str(to / folder))
     return to
 
@@ -790,7 +790,7 @@ FAULTS = (
     ("sources", "scripts/cmake/RtlModel.cmake", "list(APPEND sources ${CMAKE_SOURCE_DIR}/rtl/${line})",
      "list(INSERT sources 0 ${CMAKE_SOURCE_DIR}/rtl/${line})", "CMake: files of"),
     ("analyse", "rtl/files.f", "divider_mul.vhd\nsimilarity.vhd\n", "similarity.vhd\ndivider_mul.vhd\n", "divider_mul"),
-    ("analyse", "tb/configs/tile.json", '"window": 13', '"window": 12', "GHDL ends with 1"),
+    ("analyse", "rtl/configs/engine/tile.json", '"window": 13', '"window": 12', "GHDL ends with 1"),
     ("generics", "rtl/psweep_top.core", "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 2}",
      "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 4}", "parameters differ from the VHDL"),
     ("generics", "rtl/psweep.core", "      - G_LANES\n", "      - G_LANE\n", "parameters of the targets differ"),

@@ -3,7 +3,7 @@
 #
 #   coverage.pl lines OUT COUNT.json ..     GHDL's counts: a line is covered if any run has reached it
 #   coverage.pl toggles OUT FILE ..         names of bits, '1' or '0' and a tabulator before each
-#                                           (tb/support/coverage.hpp)
+#                                           (sw/simulator/coverage.hpp)
 use strict;
 use warnings;
 

@@ -10,4 +10,4 @@ cd "$(dirname "$0")/.."
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
 esac
-build/tb/flips/flips "$@" | tee build/flips.txt
+build/tb/upsets/flips "$@" | tee build/flips.txt

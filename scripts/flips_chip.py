@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAM = ROOT / "build/tb/flips/chip_flips"
+PROGRAM = ROOT / "build/tb/upsets/chip_flips"
 RESULT = ROOT / "build/flips_chip.txt"
 VERDICTS = ("masked", "repeated", "session", "error", "silent", "hang")
 
@@ -98,7 +98,7 @@ def main():
     report = [about] + text_table(groups, total)
     for verdict, places in sites.items():
         for where, bits in sorted(places.items()):
-            report.append(f"{verdict}: {where}: {bits_text(bits)}; again: build/tb/flips/chip_flips --only "
+            report.append(f"{verdict}: {where}: {bits_text(bits)}; again: build/tb/upsets/chip_flips --only "
                           f"{again[verdict, where]}")
     RESULT.write_text("\n".join(report) + "\n")
     print("\n".join(report))

@@ -17,6 +17,7 @@
 #   pages      tables of docs/dse.md are those of docs/dse/*.csv (scripts/dse/pages.py)
 #   evidence   blocks of README and docs are what docs/evidence/*.json makes of them, figures beyond them name their
 #              commit; what is stale is named, which is no failure (scripts/evidence.py)
+#   arrows     folders of sw/ and tb/ use only those above them, CMake links what they include (lint_arrows.py)
 #   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
 #              (scripts/cmake/ghdl_netlist.vlt)
@@ -89,9 +90,13 @@ check_evidence() {
   command -v python3 > /dev/null || skip "python3 is not installed" || return
   scripts/evidence.py lint
 }
+check_arrows() {
+  command -v python3 > /dev/null || skip "python3 is not installed" || return
+  scripts/lint_arrows.py --self-test && scripts/lint_arrows.py
+}
 check_trace() { scripts/lint_trace.pl; }
 
-# Keys of a configuration and the generics they become, as in tb/rtl/CMakeLists.txt and tb/chip/CMakeLists.txt.
+# Keys of a configuration and the generics they become, as in sw/verilated/*.cmake.
 engine_keys=(img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES
   window:WINDOW pix_bits:PIX_W weight_bits:WEIGHT_W interp_frac:INTERP_F mncc_bits:MNCC_W frac_bits:FRAC_W
   lanes:LANES rectified:RECTIFIED divider:DIVIDER)
@@ -122,12 +127,12 @@ check_verilog() {
   command -v ghdl > /dev/null || skip "ghdl is not installed" || return
   command -v verilator > /dev/null || skip "verilator is not installed" || return
   local config engine bad=0 generics
-  for config in tb/configs/*.json; do
+  for config in rtl/configs/engine/*.json; do
     mapfile -t generics < <(generics_of "$config" "${engine_keys[@]}")
     verilog_of psweep "$config" 14 "${generics[@]}" || bad=1
   done
-  for config in tb/chip/configs/*.json; do
-    engine=tb/configs/$(sed -nE 's/.*"engine": *"([a-z0-9_]+)".*/\1/p' "$config").json
+  for config in rtl/configs/chip/*.json; do
+    engine=rtl/configs/engine/$(sed -nE 's/.*"engine": *"([a-z0-9_]+)".*/\1/p' "$config").json
     mapfile -t generics < <(generics_of "$engine" "${engine_keys[@]}"; generics_of "$config" "${arbiter_keys[@]}")
     verilog_of psweep_top "$config" 20 "${generics[@]}" || bad=1
   done
@@ -157,7 +162,7 @@ check_shell() {
   shellcheck --severity=warning "${scripts[@]}"
 }
 
-checks=(layout text links files analyse vhdl attributes units tables pages evidence trace verilog format shell)
+checks=(layout text links files analyse vhdl attributes units tables pages evidence arrows trace verilog format shell)
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
   --format)

@@ -41,14 +41,14 @@ for unit in mac_rx mac_tx; do
     exit 1
   }
 done
-iverilog -g2012 -s mac_wrapper -o "$out/mac.vvp" tb/opinion/mac_wrapper.v "$out/mac_rx.v" "$out/mac_tx.v"
+iverilog -g2012 -s mac_wrapper -o "$out/mac.vvp" tb/flows/mac_wrapper.v "$out/mac_rx.v" "$out/mac_tx.v"
 
 config="$venv/bin/cocotb-config"
 GPI_USERS="$("$config" --libpython);$("$config" --pygpi-entry-point)"
 export GPI_USERS
 export PYGPI_PYTHON_BIN="$PWD/$venv/bin/python3" COCOTB_TEST_MODULES=mac_opinion COCOTB_TOPLEVEL=mac_wrapper
 case "$venv" in /*) PYGPI_PYTHON_BIN="$venv/bin/python3" ;; esac
-export COCOTB_RESULTS_FILE="$PWD/$out/results.xml" PYTHONPATH="$PWD/tb/opinion" PYTHONDONTWRITEBYTECODE=1
+export COCOTB_RESULTS_FILE="$PWD/$out/results.xml" PYTHONPATH="$PWD/tb/flows" PYTHONDONTWRITEBYTECODE=1
 export COCOTB_LOG_LEVEL=WARNING
 rm -f "$COCOTB_RESULTS_FILE"
 # vvp 11 knows modules by the ending .vpi only.

@@ -8,7 +8,7 @@
 #                    default: tiny odd_2 tiny:counted odd_2:counted
 #     :counted     the netlist whose cells 'make cost' counts: by the Yosys of scripts/cost/requirements.txt, debug
 #                  ports left open; else by the installed Yosys, with the debug ports compared too
-#     --build      folder with tb/replay/record_engine and tb/rtl/psweep_*/psweep.v (default: build)
+#     --build      folder with tb/replay/record_engine and sw/verilated/psweep_*/psweep.v (default: build)
 #     --out        where to write (default: build/sim-gates)
 #     --no-faults  without the broken cells (they are tried on the first configuration)
 #
@@ -63,7 +63,7 @@ replay() { # replay PROGRAM RECORDING [+first]: prints what the bench says; true
 
 gates() { # one configuration
   local name=${1%:counted} dir=$out/${1/:/_} begun=$SECONDS models=$cells open=()
-  local verilog=$build/tb/rtl/psweep_$name/psweep.v
+  local verilog=$build/sw/verilated/psweep_$name/psweep.v
   [ -f "$verilog" ] || { echo "there is no $verilog"; return 1; }
   rm -rf "$dir"
   mkdir -p "$dir"

@@ -128,7 +128,7 @@ scripts/same_output.sh "$out/fixed" "$out/chip"
 
 if command -v tshark > /dev/null; then
   dissector=()
-  if [ -e scripts/psweep.lua ]; then dissector=(-X lua_script:scripts/psweep.lua); fi
+  if [ -e sw/wireshark/psweep.lua ]; then dissector=(-X lua_script:sw/wireshark/psweep.lua); fi
   read_wire() {
     # XDG_CONFIG_HOME: without the preferences and plugins of whoever runs this.
     XDG_CONFIG_HOME=$out tshark -r "$out/wire.pcap" "${dissector[@]}" -o ip.check_checksum:TRUE \

@@ -19,19 +19,43 @@ endforeach()
 
 set(PSWEEP_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror)
 
-# psweep_library(<name> SOURCES .. LIBS ..): library of our own, headers relative to sw/, warnings are errors.
-# Without SOURCES it is header-only.
+# Targets of our own compile without warnings and link what their folder includes, no more and no less
+# (scripts/lint_arrows.py). What is not psweep::<library> in the lists below is not ours: packages, Verilated models.
+
+# psweep_library(<name> [SOURCES ..] [PUBLIC ..] [PRIVATE ..]): the library of a folder, psweep_<name>, to be linked as
+# psweep::<name>. PUBLIC: what its headers include; PRIVATE: what only its sources do. Includes are relative to sw/ or
+# tb/. Without SOURCES it is header-only.
 function(psweep_library name)
-  cmake_parse_arguments(A "" "" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(A "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  file(RELATIVE_PATH tree ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  string(REGEX MATCH "^[^/]+" tree ${tree})
   if(A_SOURCES)
-    add_library(${name} STATIC ${A_SOURCES})
-    target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR}/sw)
-    target_compile_options(${name} PRIVATE ${PSWEEP_WARNINGS})
-    target_link_libraries(${name} PUBLIC ${A_LIBS})
+    set(scope PUBLIC)
+    add_library(psweep_${name} STATIC ${A_SOURCES})
+    target_compile_options(psweep_${name} PRIVATE ${PSWEEP_WARNINGS})
+    target_link_libraries(psweep_${name} PRIVATE ${A_PRIVATE})
   else()
-    add_library(${name} INTERFACE)
-    target_include_directories(${name} INTERFACE ${CMAKE_SOURCE_DIR}/sw)
-    target_link_libraries(${name} INTERFACE ${A_LIBS})
+    set(scope INTERFACE)
+    add_library(psweep_${name} INTERFACE)
+  endif()
+  target_include_directories(psweep_${name} ${scope} ${PROJECT_SOURCE_DIR}/${tree})
+  target_link_libraries(psweep_${name} ${scope} ${A_PUBLIC})
+  add_library(psweep::${name} ALIAS psweep_${name})
+endfunction()
+
+# psweep_program(<name> SOURCES .. LIBS .. [AT_TOP] [ON_REQUEST]). AT_TOP: it lies in the build folder itself.
+# ON_REQUEST: built only if it is asked for.
+function(psweep_program name)
+  cmake_parse_arguments(A "AT_TOP;ON_REQUEST" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/sw)
+  target_compile_options(${name} PRIVATE ${PSWEEP_WARNINGS})
+  target_link_libraries(${name} PRIVATE ${A_LIBS})
+  if(A_AT_TOP)
+    set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+  endif()
+  if(A_ON_REQUEST)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
   endif()
 endfunction()
 
@@ -40,11 +64,8 @@ endfunction()
 # 'SKIPPED: <reason>' and then calls SUCCEED(): it is counted as skipped (scripts/summary.sh).
 function(psweep_test name)
   cmake_parse_arguments(A "" "" "SOURCES;LIBS;DEFINITIONS;LABELS" ${ARGN})
-  add_executable(${name} ${A_SOURCES})
-  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/tb ${CMAKE_SOURCE_DIR}/sw)
-  target_compile_options(${name} PRIVATE ${PSWEEP_WARNINGS})
+  psweep_program(${name} SOURCES ${A_SOURCES} LIBS ${A_LIBS} psweep_catch)
   target_compile_definitions(${name} PRIVATE ${A_DEFINITIONS})
-  target_link_libraries(${name} PRIVATE ${A_LIBS} psweep_catch)
   # Not Catch's own --warn NoAssertions: it asks for assertions in every section as well.
   catch_discover_tests(
     ${name}
@@ -52,21 +73,6 @@ function(psweep_test name)
     PROPERTIES LABELS "${A_LABELS}" SKIP_REGULAR_EXPRESSION "SKIPPED:"
                FAIL_REGULAR_EXPRESSION "No tests ran|assertions: - none -")
 endfunction()
-
-if(PSWEEP_TESTS)
-  # Debian 12 has Catch2 2 (one header), Debian 13 Catch2 3 (library); "support/catch.hpp" hides the difference.
-  find_package(Catch2 REQUIRED)
-  include(Catch)
-  add_library(psweep_catch INTERFACE)
-  if(Catch2_VERSION VERSION_GREATER_EQUAL 3)
-    target_compile_definitions(psweep_catch INTERFACE PSWEEP_CATCH2_V3)
-    target_link_libraries(psweep_catch INTERFACE Catch2::Catch2WithMain)
-  else()
-    add_library(psweep_catch_main STATIC ${CMAKE_SOURCE_DIR}/tb/support/catch_main.cpp)
-    target_link_libraries(psweep_catch_main PUBLIC Catch2::Catch2)
-    target_link_libraries(psweep_catch INTERFACE psweep_catch_main)
-  endif()
-endif()
 
 # Appends G_DIVIDER=.. of an engine's configuration to the list; without the key it is 0.
 function(psweep_divider file json list)

@@ -26,7 +26,7 @@ set(PSWEEP_VHDL_STANDARD --std=93)
 # For builds with a purpose of their own (scripts/mutants.sh, scripts/coverage.sh).
 set(PSWEEP_VERILATOR_EXTRA "" CACHE STRING "Further options of Verilator")
 set(PSWEEP_FAST_OPTION -O3 CACHE STRING "Optimisation of models that are built for long runs")
-option(PSWEEP_COVERAGE "Models count which bits change (tb/support/coverage.hpp)" OFF)
+option(PSWEEP_COVERAGE "Models count which bits change (sw/simulator/coverage.hpp)" OFF)
 set(PSWEEP_RTL_MODEL_DIR ${CMAKE_CURRENT_LIST_DIR})
 # -Wall and every warning is an error, but for the waivers of ghdl_netlist.vlt.
 set(PSWEEP_VERILATOR_FLAGS -Wall -O3 --x-initial unique --x-assign unique ${PSWEEP_VERILATOR_EXTRA})

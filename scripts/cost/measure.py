@@ -5,8 +5,8 @@
   scripts/cost/measure.py --entity E --family F [G_X=n ...]
     --entity E        file rtl/E.vhd; generics that are not given are as by default
     --unit U          of all that, only unit U (similarity, ..) with the generics that it has there
-    --config NAME     generics of tb/configs/NAME.json or build/configs/NAME.json; tb/chip/configs/NAME.json for
-                      psweep_top. G_X=n overrides one of them
+    --config NAME     generics of rtl/configs/engine/NAME.json or build/configs/NAME.json; rtl/configs/chip/NAME.json
+                      for psweep_top. G_X=n overrides one of them
     --family F        xc6v, xc5v, ecp5, ng_medium
     --hierarchy       also module by module: hierarchy is kept at the units of engine and arbiter
     --no-dsp          multipliers in LUTs
@@ -100,16 +100,16 @@ def config_generics(entity, config, rtl):
                 out[generic] = int(value)
 
     if entity == "psweep_top":
-        chip = ROOT / "tb" / "chip" / "configs" / f"{config}.json"
+        chip = ROOT / "rtl" / "configs" / "chip" / f"{config}.json"
         if chip.exists():
-            take(ROOT / "tb" / "configs" / f"{json.loads(chip.read_text())['engine']}.json")
+            take(ROOT / "rtl" / "configs" / "engine" / f"{json.loads(chip.read_text())['engine']}.json")
             take(chip)
             return out
-    for folder in (ROOT / "tb" / "configs", ROOT / "build" / "configs"):
+    for folder in (ROOT / "rtl" / "configs" / "engine", ROOT / "build" / "configs"):
         if (folder / f"{config}.json").exists():
             take(folder / f"{config}.json")
             return out
-    raise CostError(f"no configuration '{config}' in tb/configs or build/configs (make config makes one)")
+    raise CostError(f"no configuration '{config}' in rtl/configs/engine or build/configs (make config makes one)")
 
 
 def repair(verilog):

@@ -4,7 +4,7 @@
 
   scripts/cost/pnr.py [--entity E] [--config NAME] [--seeds 1,2,3] [--json FILE] [G_X=n ...]
     --entity E      default psweep
-    --config NAME   generics of tb/configs/NAME.json or build/configs/NAME.json (default tile)
+    --config NAME   generics of rtl/configs/engine/NAME.json or build/configs/NAME.json (default tile)
     --unit U        of that, only unit U (similarity, ..)
     --units         the six units of the engine, then the engine itself
     --seeds LIST    placements to try (default 1,2,3); the spread between them is as real as the figure

@@ -9,7 +9,7 @@ TILE = {"config": "tile", "tile": (256, 130)}
 NG_TILE = {"G_LANES": 2, "G_PLANE_COLS": 131, "G_PLANE_ROWS": 101, "G_IMG_COLS": 234, "G_IMG_ROWS": 114}
 
 POINTS = {
-    "bands": {"title": "bands 44-30-13-13 (`tb/configs/bands.json`)", **BANDS, "default": True,
+    "bands": {"title": "bands 44-30-13-13 (`rtl/configs/engine/bands.json`)", **BANDS, "default": True,
               "flat": ("xc6v", "xc5v", "ecp5", "ng_medium"), "units": ("xc6v",), "quick": ("xc6v",)},
     "bands_no_dsp": {"title": "bands, products in LUTs", **BANDS, "no_dsp": True, "default": True,
                      "flat": ("xc6v",)},

@@ -4,7 +4,7 @@
 
   scripts/cost/report.py                     the engines of the datasheet on Virtex-6 (some minutes)
   scripts/cost/report.py --all               every configuration and family of scripts/cost/points.py
-  scripts/cost/report.py --config NAME ..    these: a name of points.py, tb/configs or build/configs (make config)
+  scripts/cost/report.py --config NAME ..    these: of points.py, rtl/configs/engine or build/configs (make config)
     --family F,..      in these families: xc6v, xc5v, ecp5, ng_medium (default xc6v)
   scripts/cost/report.py --check [--quick]   measures anew and compares with scripts/cost/baseline.json; growth fails
   scripts/cost/report.py --update            measures all and writes baseline.json, the tables of docs/cost.md and
@@ -709,8 +709,8 @@ def main():
         if options.config:
             for name in options.config:
                 if name not in POINTS:
-                    entity = "psweep_top" if (cost.ROOT / "tb/chip/configs" / f"{name}.json").exists() and \
-                        not (cost.ROOT / "tb/configs" / f"{name}.json").exists() else "psweep"
+                    entity = "psweep_top" if (cost.ROOT / "rtl/configs/chip" / f"{name}.json").exists() and \
+                        not (cost.ROOT / "rtl/configs/engine" / f"{name}.json").exists() else "psweep"
                     cost.config_generics(entity, name, cost.ROOT / "rtl")
                     POINTS[name] = {"title": name, "entity": entity, "config": name, "flat": ()}
                     if entity == "psweep":

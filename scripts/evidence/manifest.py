@@ -8,11 +8,13 @@ belong to 'cost' and 'pnr' and are filled by scripts/cost/report.py."""
 from dataclasses import dataclass
 
 BUILD = ("CMakeLists.txt", "scripts/cmake/**")
-MODEL = ("sw/golden/**", "tb/support/**", "tb/configs/**")
-PLAN = ("sw/plan/**", "sw/golden/**", "sw/scene/**")
-CHIP = ("@chip", *BUILD, *MODEL, "tb/chip/**", "!tb/chip/test_*", "!tb/chip/link_speed.cpp", "sw/net/**")
-ENGINE = ("@engine", *BUILD, *MODEL, "tb/rtl/**", "tb/engine/engine_bench.hpp", "tb/engine/stimulus.hpp",
-          "tb/engine/configurations.hpp")
+MODEL = ("sw/contract/**", "sw/golden/**", "sw/simulator/**", "tb/support/**", "rtl/configs/engine/**")
+PLAN = ("sw/plan/**", "sw/contract/**", "sw/golden/**", "sw/scene/**")
+BUILT = ("sw/verilated/**", "sw/desk/chip_model.hpp")
+CHIP = ("@chip", *BUILD, *MODEL, *BUILT, "rtl/configs/chip/**", "sw/desk/**", "sw/net/**", "tb/chip/**",
+        "!tb/chip/test_*", "!tb/chip/link_speed.cpp")
+ENGINE = ("@engine", *BUILD, *MODEL, *BUILT, "tb/engine/engine_bench.hpp", "tb/engine/configurations.hpp",
+          "sw/scene/stimulus.hpp")
 REPLAY = ("tb/replay/**", "!tb/replay/record_*")
 
 
@@ -32,20 +34,21 @@ class Kind:
 
 KINDS: tuple[Kind, ...] = (
     Kind("mutants", ("mutants",),
-         ("@chip", *BUILD, *MODEL, "tb/units/**", "tb/engine/**", "tb/rtl/**", "tb/chip/**", "!tb/chip/link_speed.cpp",
-          "!tb/chip/test_goodput.cpp", "!tb/chip/test_link*", "tb/replay/**", "tb/soak/**", "sw/net/**", "sw/plan/**",
-          "sw/scene/**", "scripts/mutants/**", "scripts/mutants_equivalent.txt"),
+         ("@chip", *BUILD, *MODEL, *BUILT, "rtl/configs/chip/**", "tb/units/**", "tb/engine/**", "tb/chip/**",
+          "!tb/chip/link_speed.cpp", "!tb/chip/test_goodput.cpp", "!tb/chip/test_link*", "tb/replay/**", "tb/soak/**",
+          "sw/desk/**", "sw/net/**", "sw/plan/**", "sw/scene/**", "scripts/mutants/**",
+          "scripts/mutants_equivalent.txt"),
          60, "build/evidence/mutants.json", speaks_for_itself=True, takes_a_copy=True,
          goes_on="mutant by mutant, also after edits: build/mutants/results.jsonl"),
-    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/flips/**", "scripts/flips_chip.py"), 15, "build/flips_chip.txt"),
-    Kind("flips", ("flips",), (*ENGINE, "tb/flips/flips.cpp", "tb/flips/inject.pl", "scripts/flips.sh"), 2,
+    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/upsets/**", "scripts/flips_chip.py"), 15, "build/flips_chip.txt"),
+    Kind("flips", ("flips",), (*ENGINE, "tb/upsets/flips.cpp", "tb/upsets/inject.pl", "scripts/flips.sh"), 2,
          "build/flips.txt"),
     Kind("soak", ("soak",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/soak.sh"), 4),
     Kind("formal", ("formal",),
          ("@chip", "tb/formal/**", "scripts/formal.sh"), 4),
     Kind("rules", ("rules",), (*ENGINE, *REPLAY, "tb/replay/record_engine.cpp", "scripts/rules.sh"), 2),
     Kind("cost", ("cost-update",),
-         ("@chip", "tb/configs/**", "tb/chip/configs/**", "sw/app/shape_table.cpp", "sw/app/link_table.cpp", *PLAN,
+         ("@chip", "rtl/configs/**", "sw/forecast/**", *PLAN,
           "scripts/cost/**", "!scripts/cost/baseline.json", "!scripts/cost/pnr.py", "!scripts/cost/report.py"),
          20, "scripts/cost/baseline.json", goes_on="count by count: build/cost/cache"),
     Kind("gates", ("sim-gates",),
@@ -55,22 +58,24 @@ KINDS: tuple[Kind, ...] = (
          (*CHIP, "tb/chip/link_speed.cpp", "tb/chip/test_goodput.cpp", "sw/fast/**", *PLAN, "scripts/link_speed.sh"),
          8),
     Kind("sim-ghdl", ("sim-ghdl",), (*ENGINE, *REPLAY, "tb/replay/record_engine.cpp", "scripts/sim_ghdl.sh"), 6),
-    Kind("link-table", ("link-table",), ("sw/app/link_table.cpp", *PLAN, "sw/net/**"), 2),
-    Kind("shape-table", ("shape-table",), ("sw/app/shape_table.cpp", *PLAN, "scripts/shape_table.sh"), 1),
+    Kind("link-table", ("link-table",), ("sw/forecast/link_*", *PLAN), 2),
+    Kind("shape-table", ("shape-table",), ("sw/forecast/shape_table.cpp", *PLAN, "scripts/shape_table.sh"), 1),
     Kind("sweep", ("sweep",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/sweep.sh", "scripts/make_config.cmake"), 6,
          "build/sweep/results.txt"),
     Kind("coverage-lines", ("coverage-lines",),
-         ("@chip", *BUILD, *MODEL, "tb/replay/**", "tb/rtl/**", "tb/chip/**", "!tb/chip/test_*", "sw/net/**",
+         (*CHIP, "tb/replay/**",
           "scripts/coverage.sh", "scripts/coverage.pl", "scripts/coverage_holes.txt"),
          20, "build/coverage/lines.txt", needs="GHDL 4 or newer (Debian 13)"),
     Kind("coverage-toggles", ("coverage-toggles",),
-         ("@chip", *BUILD, *MODEL, "tb/units/**", "tb/engine/**", "tb/rtl/**", "tb/chip/**", "sw/net/**",
-          "scripts/coverage.sh", "scripts/coverage.pl"),
+         ("@chip", *BUILD, *MODEL, *BUILT, "rtl/configs/chip/**", "tb/units/**", "tb/engine/**", "tb/chip/**",
+          "sw/desk/**", "sw/net/**", "scripts/coverage.sh", "scripts/coverage.pl"),
          35, "build/coverage/toggles.txt"),
     Kind("accuracy", ("accuracy",),
-         ("sw/eval/**", "sw/scene/**", "sw/reference/**", "sw/golden/**", "sw/fast/**", "sw/core/**"), 30),
-    Kind("pnr", ("pnr-update",), ("@engine", "tb/configs/tile.json", "scripts/cost/**", "!scripts/cost/baseline.json",
-                                  "!scripts/cost/report.py"), 60, "scripts/cost/baseline.json"),
+         ("sw/eval/**", "sw/app/accuracy.cpp", "sw/scene/**", "sw/reference/**", "sw/contract/**", "sw/golden/**",
+          "sw/fast/**", "sw/core/**"), 30),
+    Kind("pnr", ("pnr-update",), ("@engine", "rtl/configs/engine/tile.json", "scripts/cost/**",
+                                  "!scripts/cost/baseline.json", "!scripts/cost/report.py"), 60,
+         "scripts/cost/baseline.json"),
     Kind("fresh-machine", ("fresh-machine SUITE=bookworm", "fresh-machine SUITE=trixie"),
          ("@chip", "CMakeLists.txt", "Makefile", "tb/**", "sw/**", "scripts/setup.sh", "scripts/packages.txt",
           "scripts/sim.sh", "scripts/demo.sh", "scripts/fresh_machine.sh"), 50, needs="root and debootstrap"),

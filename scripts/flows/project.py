@@ -2,7 +2,7 @@
 """What the vendor flows have in common: sources, entities, generics of a configuration, boards, the top with pins.
 
 Nothing is listed twice: files come from rtl/files.f, generics and ports from the VHDL, configurations from
-tb/configs and tb/chip/configs as for scripts/cost/measure.py, boards from constraints/<board>/board.json.
+rtl/configs/engine and rtl/configs/chip as for scripts/cost/measure.py, boards from constraints/<board>/board.json.
 
 A flow builds <top>_pins, an entity that wrapper() writes, with <top> as its only instance u_<top>. Outputs dbg_* are
 for waves and would take hundreds of pads: they stay open.

@@ -35,17 +35,17 @@ def unit(name: str) -> Test:
 def _soak(config: str) -> Test:
     return Test(f"soak of {config}", f"engine_{config}", ("soak",), ("tb/soak/soak", "-a"), True, False,
                 ("tb/soak/soak.cpp",), "psweep", (("PSWEEP_CONFIG", config), ("PSWEEP_TILES", "150")),
-                (f"tb/configs/{config}.json", "tb/replay/engine.cpp.in", "tb/replay/ports.pl"))
+                (f"rtl/configs/engine/{config}.json", "tb/replay/engine.cpp.in", "tb/replay/ports.pl"))
 
 
 def _ctest(name: str, pattern: str, targets: tuple[str, ...], starts: tuple[str, ...], top: str) -> Test:
     command = ("ctest", "--no-tests=error", "--output-on-failure", "-R", pattern)
-    return Test(name, "all", targets, command, True, True, starts, top, (), ("tb/replay/", "tb/configs/"))
+    return Test(name, "all", targets, command, True, True, starts, top, (), ("tb/replay/", "rtl/configs/engine/"))
 
 
 def _program(folder: str, name: str, top: str, *arguments: str) -> Test:
     return Test(name, "all", (name,), (f"tb/{folder}/{name}", "-a", *arguments), True, True,
-                (f"tb/{folder}/{name}.cpp",), top, (), ("tb/configs/", f"tb/{'chip' if top != 'psweep' else 'rtl'}/"))
+                (f"tb/{folder}/{name}.cpp",), top, (), ("rtl/configs/", "sw/verilated/"))
 
 
 ENGINE = (
@@ -61,11 +61,11 @@ ENGINE = (
 _CHIP_FIRST = (
     Test("fuzz of tiny_min", "chip_tiny_min", ("test_fuzz",), ("tb/chip/test_fuzz", "-a"), True, False,
          ("tb/chip/test_fuzz.cpp",), "psweep_top", (("PSWEEP_FUZZ_CHIP", "tiny_min"), ("PSWEEP_FUZZ_FRAMES", "1000")),
-         ("tb/configs/tiny_9.json", "tb/chip/configs/tiny_min.json")),
+         ("rtl/configs/engine/tiny_9.json", "rtl/configs/chip/tiny_min.json")),
     Test("pairs on tiny", "chip_tiny", ("test_chip",),
          ("tb/chip/test_chip", "-a", "chip: half duplex*,chip: reset in the*,chip: clocks of the*,chip: another host*"),
          True, False, ("tb/chip/test_chip.cpp",), "psweep_top", (),
-         ("tb/configs/tiny.json", "tb/chip/configs/tiny.json")),
+         ("rtl/configs/engine/tiny.json", "rtl/configs/chip/tiny.json")),
     _program("chip", "test_fuzz", "psweep_top"),
     _program("chip", "test_chip", "psweep_top", "~chip: recording*"),
 )

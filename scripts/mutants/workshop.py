@@ -15,7 +15,7 @@ from mutants.chains import Test
 
 FOLDERS = ("CMakeLists.txt", "rtl", "sw", "tb", "scripts")
 # Large and slow; no test used here needs them.
-_LEFT_OUT = re.compile(r"tb/(chip/)?configs/(tile|bands)\.json$|(^|/)__pycache__/")
+_LEFT_OUT = re.compile(r"rtl/configs/(engine|chip)/(tile|bands)\.json$|(^|/)__pycache__/")
 _OPTIONS = ("-DPSWEEP_VERILATOR_EXTRA=-Wno-fatal", "-DPSWEEP_FAST_OPTION=-O1", "-DCMAKE_DISABLE_FIND_PACKAGE_ZLIB=ON")
 
 
@@ -110,7 +110,7 @@ class Job:
         kind, _, config = name.partition("_")
         if kind == "engine":
             (build / "configs").mkdir(parents=True, exist_ok=True)
-            text = (self.tree / "tb" / "configs" / f"{config}.json").read_bytes()
+            text = (self.tree / "rtl" / "configs" / "engine" / f"{config}.json").read_bytes()
             (build / "configs" / f"{config}.json").write_bytes(text)
             options.append("-DPSWEEP_SWEEP=ON")
         elif kind == "chip":

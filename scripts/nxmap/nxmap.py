@@ -5,7 +5,7 @@
   scripts/nxmap/nxmap.py [--board B] [--top T] [--config NAME] [--out FOLDER] [option ..] [G_X=n ..]
     --board B       folder of constraints/ whose board.json has "tool": "nxmap" (default ng_medium)
     --top T         psweep_top (default): with pins; psweep, arbiter: alone, for resources and clock
-    --config NAME   as for 'make cost': tb/chip/configs/NAME.json for psweep_top, else tb/configs or build/configs, or
+    --config NAME   as for 'make cost': rtl/configs/chip for psweep_top, else rtl/configs/engine or build/configs, or
                     a row of docs/cost.md (scripts/cost/points.py); default: that of board.json for psweep_top, else
                     tile. G_X=n overrides a generic
     --mhz F         clock of psweep; psweep_top and arbiter: G_CLK_KHZ. Default: by board.json or the configuration

@@ -12,9 +12,7 @@
 #include "fast/fast.hpp"
 #include "golden/control.hpp"
 #include "net/udp_transport.hpp"
-#ifdef PSWEEP_HAVE_RTL
-#include "rtl/rtl_engine.hpp"
-#endif
+#include "verilated/rtl_engine.hpp"
 
 namespace psweep {
 namespace {
@@ -125,8 +123,6 @@ EngineRun run_link_engine(const EngineRequest& r, const Gray& left, const Gray& 
   return run;
 }
 
-#ifdef PSWEEP_HAVE_RTL
-
 // The configuration and tile size that finish in the fewest clocks; both may be fixed by the user.
 const rtl::Configuration* choose(SweepSetup& setup, const std::string& tile, const std::string& name, Plan& plan) {
   const rtl::Configuration* best = nullptr;
@@ -228,21 +224,17 @@ EngineRun run_rtl_engine(const Gray& left, const Gray& right, SweepSetup setup, 
   return run;
 }
 
-#endif
-
 }  // namespace
 
 golden::Config configuration_named(const std::string& name) {
-#ifdef PSWEEP_HAVE_RTL
+  if (rtl::configurations().empty())
+    throw InputError("--config: found '" + name + "', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
   std::string built;
   for (const auto& c : rtl::configurations()) {
     if (c.name == name) return c.config;
     built += (built.empty() ? "" : ", ") + c.name;
   }
   throw InputError("--config: found '" + name + "', expected one of the built configurations: " + built);
-#else
-  throw InputError("--config: found '" + name + "', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
-#endif
 }
 
 EngineRun run_engine(const EngineRequest& r, const Gray& left, const Gray& right, const ProgressCall& progress) {
@@ -256,13 +248,11 @@ EngineRun run_engine(const EngineRequest& r, const Gray& left, const Gray& right
     run.seconds = since(start);
     return run;
   }
-#ifdef PSWEEP_HAVE_RTL
-  if (r.engine == "rtl") return run_rtl_engine(left, right, r.setup, r.tile, r.configuration, threads, progress);
-#else
   if (r.engine == "rtl") {
-    throw InputError("--engine: found 'rtl', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
+    if (rtl::configurations().empty())
+      throw InputError("--engine: found 'rtl', but this psweep was built without RTL (cmake -DPSWEEP_RTL=ON)");
+    return run_rtl_engine(left, right, r.setup, r.tile, r.configuration, threads, progress);
   }
-#endif
   if (r.engine.compare(0, 6, "udp://") == 0) return run_link_engine(r, left, right, progress);
   throw InputError("--engine: found '" + r.engine + "', expected float, fixed, rtl or udp://HOST[:PORT]");
 }

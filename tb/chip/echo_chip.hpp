@@ -7,8 +7,9 @@
 #include <optional>
 #include <random>
 
-#include "chip/chip_model.hpp"
 #include "contract/frames.hpp"
+#include "core/error.hpp"
+#include "desk/chip_model.hpp"
 
 namespace psweep::chip {
 

@@ -2,7 +2,7 @@
 // Goodput: what psweep bench-link measures, and the same counted at the chip's pins, frame by frame and in simulated
 // time: pixels of the WRITEs and cells of the map packets between the first of them and the last.
 #pragma once
-#include "chip/chip_transport.hpp"
+#include "desk/chip_transport.hpp"
 #include "net/link_bench.hpp"
 
 namespace psweep::chip {

@@ -21,6 +21,7 @@
 #include "net/link_engine.hpp"
 #include "plan/planner.hpp"
 #include "scene/scene.hpp"
+#include "verilated/chips.hpp"
 
 namespace psweep::chip {
 namespace {

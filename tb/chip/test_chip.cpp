@@ -11,18 +11,19 @@
 #include <random>
 #include <set>
 
-#include "chip/chip_transport.hpp"
 #include "contract/registers.hpp"
 #include "core/error.hpp"
-#include "engine/stimulus.hpp"
+#include "desk/chip_transport.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "net/link_engine.hpp"
 #include "plan/planner.hpp"
 #include "scene/scene.hpp"
+#include "scene/stimulus.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/temporary_dir.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;
@@ -479,7 +480,9 @@ struct Crowd {
 // Small tile of a configuration as messages.
 struct TileMessages {
   explicit TileMessages(const Chip& chip)
-      : config(chip.config), maker(config.engine, 5), tile(maker.make(Texture::kRandom, Geometry::kInside, 4, 3, 2)) {}
+      : config(chip.config),
+        maker(config.engine, 5),
+        tile(maker.make(scene::Texture::kRandom, scene::Geometry::kInside, 4, 3, 2)) {}
   uint32_t pixels() const { return static_cast<uint32_t>(tile.job.win_cols * tile.job.win_rows); }
   uint32_t chunks() const { return (pixels() + config.chunk_pairs() - 1) / config.chunk_pairs(); }
   net::Bytes table(uint32_t token) const {
@@ -535,8 +538,8 @@ struct TileMessages {
   }
 
   const net::ArbiterConfig& config;
-  StimulusMaker maker;
-  Stimulus tile;
+  scene::StimulusMaker maker;
+  scene::Stimulus tile;
 };
 
 int maps(const std::vector<net::Bytes>& payloads) {
@@ -867,7 +870,7 @@ TEST_CASE("chip: a host that asks without a pause gets its map all the same") {
   Crowd crowd(b.desk, b.address);
   const uint32_t token = crowd.open(kHost);
   TileMessages tile(chip);
-  tile.tile = tile.maker.make(Texture::kRandom, Geometry::kInside, 6, 5, 2);
+  tile.tile = tile.maker.make(scene::Texture::kRandom, scene::Geometry::kInside, 6, 5, 2);
   tile.run(crowd, kHost, token);
   const auto chunks = static_cast<uint32_t>((30 + chip.config.chunk_cells() - 1) / chip.config.chunk_cells());
   REQUIRE(chunks >= 2);

@@ -33,15 +33,15 @@
 #include <random>
 #include <string>
 
-#include "chip/chips.hpp"
-#include "chip/desk.hpp"
-#include "engine/stimulus.hpp"
+#include "desk/desk.hpp"
 #include "golden/arbiter.hpp"
 #include "golden/mac_rx.hpp"
 #include "golden/packet_rx.hpp"
 #include "golden/packet_tx.hpp"
 #include "net/client.hpp"
+#include "scene/stimulus.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;
@@ -581,16 +581,16 @@ class Fuzz {
     for (uint8_t& x : b) x = static_cast<uint8_t>(random_());
     return b;
   }
-  tb::Stimulus any_tile(int most_planes) {
+  scene::Stimulus any_tile(int most_planes) {
     const golden::Config& c = config_.engine;
     if (one_in(8)) {
-      return maker_.make(tb::Texture::kRandom, one_in(2) ? tb::Geometry::kInside : tb::Geometry::kSkewed, c.plane_cols,
-                         c.plane_rows, most_planes);
+      return maker_.make(scene::Texture::kRandom, one_in(2) ? scene::Geometry::kInside : scene::Geometry::kSkewed,
+                         c.plane_cols, c.plane_rows, most_planes);
     }
     const bool large = one_in(4);
     const int cols = 1 + below(large ? c.plane_cols : std::min(6, c.plane_cols));
     const int rows = 1 + below(large ? c.plane_rows : std::min(4, c.plane_rows));
-    return maker_.make(static_cast<tb::Texture>(below(5)), static_cast<tb::Geometry>(below(4)), cols, rows,
+    return maker_.make(static_cast<scene::Texture>(below(5)), static_cast<scene::Geometry>(below(4)), cols, rows,
                        1 + below(std::min(most_planes, large ? most_planes : 3)));
   }
   // Plane table for the tiles to come, and the next of them.
@@ -607,11 +607,11 @@ class Fuzz {
     for (size_t i = first; i < std::min(first + count, table_.size()); ++i) net::append32(b, table_[i]);
     return b;
   }
-  static uint32_t pixels(const tb::Stimulus& t) { return static_cast<uint32_t>(t.job.win_cols * t.job.win_rows); }
-  uint32_t chunks(const tb::Stimulus& t) const {
+  static uint32_t pixels(const scene::Stimulus& t) { return static_cast<uint32_t>(t.job.win_cols * t.job.win_rows); }
+  uint32_t chunks(const scene::Stimulus& t) const {
     return (pixels(t) + config_.chunk_pairs() - 1) / config_.chunk_pairs();
   }
-  Bytes start_bytes(const tb::Stimulus& t, uint32_t table) const {
+  Bytes start_bytes(const scene::Stimulus& t, uint32_t table) const {
     Bytes b;
     net::append16(b, table);
     net::append16(b, 0);
@@ -638,7 +638,7 @@ class Fuzz {
       net::put32(b, at, one_in(3) ? any() : one_in(2) ? 0 : net::get32(b, at) ^ (1u << below(32)));
     }
   }
-  Bytes rows(const tb::Stimulus& t, uint32_t chunk) const {
+  Bytes rows(const scene::Stimulus& t, uint32_t chunk) const {
     Bytes b;
     for (int i = 0; i < config_.chunk_pairs(); ++i) {
       const size_t at = static_cast<size_t>(chunk) * config_.chunk_pairs() + i;
@@ -979,7 +979,7 @@ class Fuzz {
   net::ArbiterConfig config_;
   net::Address own_;
   std::mt19937 random_;
-  tb::StimulusMaker maker_;
+  scene::StimulusMaker maker_;
   golden::Arbiter model_;
   Mangler* mangler_ = nullptr;
   std::unique_ptr<Desk> desk_;
@@ -988,7 +988,7 @@ class Fuzz {
   std::vector<net::Address> peers_;
   std::vector<Expected> expected_;
   std::vector<Bytes> out_, latest_;  // since the last comparison; of the last one that had any
-  tb::Stimulus tile_, next_;         // that the table was made for; in the row buffer
+  scene::Stimulus tile_, next_;      // that the table was made for; in the row buffer
   std::vector<uint32_t> table_;
   std::array<int64_t, 2> waits_{};  // counters 24 and 25 at the latest COUNTERS: chip less model
   std::map<std::string, int64_t> classes_;

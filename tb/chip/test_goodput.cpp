@@ -9,11 +9,12 @@
 #include <deque>
 #include <random>
 
-#include "chip/chip_transport.hpp"
+#include "desk/chip_transport.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "net/link_engine.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;

@@ -7,8 +7,9 @@
 
 #include "chip/goodput.hpp"
 #include "chip/model_chip.hpp"
-#include "chip/session_watch.hpp"
+#include "desk/session_watch.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;

@@ -5,9 +5,9 @@
 #include <iterator>
 #include <set>
 
-#include "chip/desk.hpp"
 #include "chip/echo_chip.hpp"
-#include "chip/station.hpp"
+#include "desk/desk.hpp"
+#include "desk/station.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_dir.hpp"
 

@@ -6,10 +6,11 @@
 #include <cstdio>
 
 #include "chip/watched.hpp"
+#include "forecast/link_plan.hpp"
 #include "golden/control.hpp"
 #include "net/link_engine.hpp"
-#include "plan/link_plan.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole chip and its PHY: clocks that are missing, stop and come back, pulses on the reset pin, frames that the PHY
 // loops back, carrier sense that is stuck; UDP to a closed port.
-#include "chip/chip_transport.hpp"
-#include "chip/chips.hpp"
+#include "desk/chip_transport.hpp"
 #include "net/client.hpp"
 #include "support/catch.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;

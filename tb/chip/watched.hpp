@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "chip/chip_transport.hpp"
+#include "desk/chip_transport.hpp"
 
 namespace psweep::chip {
 

@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "chip/pcap.hpp"
+#include "desk/pcap.hpp"
 #include "support/temporary_dir.hpp"
 
 namespace psweep::tb {

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// scripts/psweep.lua in tshark: every field of every message with its value and place, messages cut at every length,
-// what links requests and replies, other ports, rubbish, and a session of the simulated chip. Numbers and bytes come
-// from sw/contract/protocol.hpp; what tshark shows comes from its PDML.
-// Where there is no tshark that runs Lua scripts each case says SKIPPED and why.
+// sw/wireshark/psweep.lua in tshark: every field of every message with its value and place, messages cut at every
+// length, what links requests and replies, other ports, rubbish, and a session of the simulated chip. Numbers and bytes
+// come from sw/contract/protocol.hpp; what tshark shows comes from its PDML. Where there is no tshark that runs Lua
+// scripts each case says SKIPPED and why.
 #include <cstdio>
 #include <fstream>
 #include <random>
 
-#include "chip/chip_transport.hpp"
-#include "chip/pcap.hpp"
 #include "contract/registers.hpp"
+#include "desk/chip_transport.hpp"
+#include "desk/pcap.hpp"
 #include "dissector/messages.hpp"
 #include "dissector/pdml.hpp"
-#include "engine/stimulus.hpp"
 #include "net/link_engine.hpp"
+#include "scene/stimulus.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_dir.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::tb;
@@ -923,9 +924,9 @@ TEST_CASE("dissector: a session of the simulated chip, every field of every pack
   net::Client client(transport, 1.0, test_seed());
   const auto capabilities = client.info();
   const golden::Config& engine = chip.config.engine;
-  StimulusMaker maker(engine, test_seed());
-  const Stimulus s =
-      maker.make(Texture::kStereo, Geometry::kInside, engine.plane_cols, engine.plane_rows, engine.planes);
+  scene::StimulusMaker maker(engine, test_seed());
+  const scene::Stimulus s = maker.make(scene::Texture::kStereo, scene::Geometry::kInside, engine.plane_cols,
+                                       engine.plane_rows, engine.planes);
   int done = 0;
   net::run_link_tiles(
       client, capabilities, s.table, 6, {},

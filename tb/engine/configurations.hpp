@@ -10,7 +10,7 @@
 #include "Vpsweep_rectified.h"
 #include "Vpsweep_rectified_2.h"
 #include "Vpsweep_tiny.h"
-#include "rtl/rtl_engine.hpp"
+#include "verilated/rtl_engine.hpp"
 
 namespace psweep::tb {
 

@@ -11,9 +11,9 @@
 #include <string>
 
 #include "contract/registers.hpp"
-#include "engine/stimulus.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
+#include "scene/stimulus.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/stream.hpp"
@@ -66,7 +66,7 @@ class EngineBench : public Agent {
     for (const auto& w : golden::job_writes(job)) write(w.address, w.value);
   }
   // Packet of the first `count` pixels (all by default), tlast on the last of them unless `last` is false.
-  void send_pixels(const Stimulus& s, size_t count = ~size_t{0}, bool last = true) {
+  void send_pixels(const scene::Stimulus& s, size_t count = ~size_t{0}, bool last = true) {
     count = std::min(count, s.left.data.size());
     for (size_t i = 0; i < count; ++i)
       pix.push(golden::pixel_beat(config_, s.left, s.right, i), last && i + 1 == count);
@@ -80,7 +80,7 @@ class EngineBench : public Agent {
   }
 
   // A good tile from registers to the last cell.
-  void run(const Stimulus& s) {
+  void run(const scene::Stimulus& s) {
     INFO(s.name << ", tile " << tiles_ << ", stalls " << stalls_.cfg << ' ' << stalls_.pix << ' ' << stalls_.map);
     sim.run(2);  // counters of what went before come to rest
     const unsigned done = dut.tiles_done, count_before = dut.error_count, lost_before = dut.window_errors;
@@ -106,7 +106,7 @@ class EngineBench : public Agent {
 
   // Expectations
   // -------------------------------------------------------------------------------------------------------
-  void expect(const Stimulus& s) {
+  void expect(const scene::Stimulus& s) {
     stimulus_ = s;
     next_plane_ = 0;
     expected_lost_ = 0;
@@ -325,7 +325,7 @@ class EngineBench : public Agent {
   std::deque<Lane> lanes_;  // stay where they are
   Scoreboard map_address_{"map address"}, map_word_{"map word"}, cell_{"cell"};
   std::vector<Scoreboard*> boards_;
-  Stimulus stimulus_;
+  scene::Stimulus stimulus_;
   std::vector<golden::Cell> cells_;
   int next_plane_ = 0, tiles_ = 0, most_planes_ = 0;
   bool pending_ = false, muted_ = false;

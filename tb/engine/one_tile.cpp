@@ -7,11 +7,11 @@
 #include <cstdlib>
 
 #include "contract/registers.hpp"
-#include "engine/stimulus.hpp"
 #include "fast/fast.hpp"
 #include "golden/control.hpp"
-#include "rtl/rtl_engine.hpp"
+#include "scene/stimulus.hpp"
 #include "support/scoreboard.hpp"
+#include "verilated/rtl_engine.hpp"
 
 using namespace psweep;
 using namespace psweep::tb;
@@ -39,8 +39,8 @@ int run(int argc, char** argv) {
   const int planes = argument(2, c.config.planes, 1, c.config.planes, "PLANES");
   const int cols = argument(3, c.config.plane_cols, 1, c.config.plane_cols, "COLS");
   const int rows = argument(4, c.config.plane_rows, 1, c.config.plane_rows, "ROWS");
-  StimulusMaker maker(c.config, static_cast<uint32_t>(argument(5, 1, 0, 1 << 30, "SEED")));
-  const Stimulus s = maker.make(Texture::kStereo, Geometry::kInside, cols, rows, planes);
+  scene::StimulusMaker maker(c.config, static_cast<uint32_t>(argument(5, 1, 0, 1 << 30, "SEED")));
+  const scene::Stimulus s = maker.make(scene::Texture::kStereo, scene::Geometry::kInside, cols, rows, planes);
   const uint64_t clocks = golden::engine_clocks(c.config, s.job);
   std::printf("%s: %dx%d cells, %d planes, window %d, images %dx%d: %.3f M clocks\n", c.name.c_str(), cols, rows,
               planes, c.config.window, s.job.win_cols, s.job.win_rows, static_cast<double>(clocks) / 1e6);

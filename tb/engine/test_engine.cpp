@@ -13,12 +13,12 @@ TEMPLATE_TEST_CASE("engine: every texture in every geometry, back to back", "", 
   INFO("seed " << seed);
   const golden::Config config = TestType::config();
   EngineBench<typename TestType::Dut> bench(config, seed);
-  StimulusMaker maker(config, seed);
+  scene::StimulusMaker maker(config, seed);
   uint64_t found = 0;
   for (int texture = 0; texture < 5; ++texture) {
     for (int geometry = 0; geometry < 4; ++geometry) {
       const bool full = geometry == 0;
-      bench.run(maker.make(static_cast<Texture>(texture), static_cast<Geometry>(geometry),
+      bench.run(maker.make(static_cast<scene::Texture>(texture), static_cast<scene::Geometry>(geometry),
                            full ? config.plane_cols : 1 + maker.below(config.plane_cols),
                            full ? config.plane_rows : 1 + maker.below(config.plane_rows),
                            full ? config.planes : 1 + maker.below(config.planes)));
@@ -37,27 +37,27 @@ TEMPLATE_TEST_CASE("engine: stalls on every stream change nothing but the clocks
   const Stalls stalls{which & 1 ? amount : 0, which & 2 ? amount : 0, which & 4 ? amount : 0};
   const golden::Config config = TestType::config();
   EngineBench<typename TestType::Dut> bench(config, seed, stalls);
-  StimulusMaker maker(config, seed);
+  scene::StimulusMaker maker(config, seed);
   for (int i = 0; i < 3; ++i) bench.run(maker.any());
 }
 
 TEMPLATE_TEST_CASE("engine: smallest tiles", "", Tiny, Odd, Odd2, Odd4, Rectified, Rectified2) {
   const golden::Config config = TestType::config();
   EngineBench<typename TestType::Dut> bench(config, test_seed());
-  StimulusMaker maker(config, test_seed());
-  bench.run(maker.make(Texture::kRandom, Geometry::kInside, 1, 1, 1));
-  bench.run(maker.make(Texture::kStereo, Geometry::kInside, 1, 1, config.planes));
-  bench.run(maker.make(Texture::kStereo, Geometry::kInside, 1, config.plane_rows, config.planes));
-  bench.run(maker.make(Texture::kStereo, Geometry::kInside, config.plane_cols, 1, config.planes));
+  scene::StimulusMaker maker(config, test_seed());
+  bench.run(maker.make(scene::Texture::kRandom, scene::Geometry::kInside, 1, 1, 1));
+  bench.run(maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 1, 1, config.planes));
+  bench.run(maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 1, config.plane_rows, config.planes));
+  bench.run(maker.make(scene::Texture::kStereo, scene::Geometry::kInside, config.plane_cols, 1, config.planes));
   for (int cols = 2; cols < 9; ++cols)  // rows around the shortest that needs no idle clocks
-    bench.run(maker.make(Texture::kStereo, Geometry::kInside, cols, 2, 3));
+    bench.run(maker.make(scene::Texture::kStereo, scene::Geometry::kInside, cols, 2, 3));
 }
 
 TEMPLATE_TEST_CASE("engine: random tiles with random stalls", "", Tiny, Odd, Odd2, Odd4, Rectified, Rectified2) {
   const uint32_t seed = test_seed() + 2;
   INFO("seed " << seed);
   const golden::Config config = TestType::config();
-  StimulusMaker maker(config, seed);
+  scene::StimulusMaker maker(config, seed);
   for (int i = 0; i < 6; ++i) {
     auto stall = [&] { return maker.below(2) ? 0.0 : maker.uniform(0, 0.9); };
     EngineBench<typename TestType::Dut> bench(config, seed + static_cast<uint32_t>(i), {stall(), stall(), stall()});

@@ -31,19 +31,20 @@ void check(const Bench& b, unsigned errors, unsigned error_count, unsigned done,
 // A bench with table and registers of a tile written, and a maker for more.
 struct Prepared {
   golden::Config config = Tiny::config();
-  StimulusMaker maker{config, test_seed()};
+  scene::StimulusMaker maker{config, test_seed()};
   Bench bench;
-  Stimulus tile;
+  scene::Stimulus tile;
 
   explicit Prepared(Stalls stalls = {}) : bench(config, test_seed(), stalls) {
-    tile = maker.make(Texture::kStereo, Geometry::kInside, 7, 6, 4);
+    tile = maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 7, 6, 4);
     bench.write_table(tile.table);
     bench.write_job(tile.job);
     bench.flush_cfg();
   }
   // The engine is none the worse: a random tile is right from end to end.
   void good_tile() {
-    bench.run(maker.make(Texture::kStereo, Geometry::kInside, 1 + maker.below(16), 1 + maker.below(12), 5));
+    bench.run(
+        maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 1 + maker.below(16), 1 + maker.below(12), 5));
     bench.run(maker.any());
   }
 };
@@ -109,8 +110,8 @@ TEST_CASE("errors: planes beyond the written table refuse the tile") {
   const golden::Config config = Tiny::config();
   const int missing_words = GENERATE(1, 8, 32);
   Bench bench(config, test_seed());
-  StimulusMaker maker(config, test_seed());
-  const Stimulus s = maker.make(Texture::kRandom, Geometry::kInside, 5, 5, 4);
+  scene::StimulusMaker maker(config, test_seed());
+  const scene::Stimulus s = maker.make(scene::Texture::kRandom, scene::Geometry::kInside, 5, 5, 4);
   auto words = golden::table_writes(s.table);
   words.resize(words.size() - static_cast<size_t>(missing_words));
   for (const auto& w : words) bench.write(w.address, w.value);
@@ -168,7 +169,8 @@ TEST_CASE("errors: samples not loaded are counted, one event a tile, and the til
   unsigned events = 0;
   uint64_t lost = 0;
   for (int i = 0; i < 6; ++i) {
-    const Stimulus s = p.maker.make(Texture::kStereo, Geometry::kLost, 1 + p.maker.below(16), 1 + p.maker.below(12), 5);
+    const scene::Stimulus s =
+        p.maker.make(scene::Texture::kStereo, scene::Geometry::kLost, 1 + p.maker.below(16), 1 + p.maker.below(12), 5);
     p.bench.run(s);  // compares window_errors, error_count and every stage
     lost = p.bench.dut.window_errors;
     events = p.bench.dut.error_count;
@@ -176,7 +178,7 @@ TEST_CASE("errors: samples not loaded are counted, one event a tile, and the til
   CHECK(events == 6);
   CHECK(lost > 100);
   CHECK(p.bench.dut.errors == golden::kErrorWindow);
-  p.bench.run(p.maker.make(Texture::kStereo, Geometry::kInside, 9, 9, 5));
+  p.bench.run(p.maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 9, 9, 5));
   CHECK(p.bench.dut.error_count == events);
 }
 
@@ -209,8 +211,8 @@ TEST_CASE("errors: unknown registers and table words out of order are refused") 
 TEST_CASE("errors: the last word of a full table is accepted, the next one not") {
   const golden::Config config = Tiny::config();
   Bench bench(config, test_seed());
-  StimulusMaker maker(config, test_seed());
-  bench.run(maker.make(Texture::kStereo, Geometry::kInside, 16, 12, config.planes));
+  scene::StimulusMaker maker(config, test_seed());
+  bench.run(maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 16, 12, config.planes));
   CHECK(bench.dut.errors == 0);
   bench.write(static_cast<uint16_t>(golden::kRegTable + 8 * config.planes), 0);
   bench.flush_cfg();
@@ -346,7 +348,7 @@ TEST_CASE("errors: clear resets bits and counters and nothing else, also in mid-
   p.bench.command(golden::kCommandStart);
   p.bench.flush_cfg();
   p.bench.run_until_state(State::kIdle);
-  p.bench.run(p.maker.make(Texture::kStereo, Geometry::kLost, 5, 5, 3));
+  p.bench.run(p.maker.make(scene::Texture::kStereo, scene::Geometry::kLost, 5, 5, 3));
   p.bench.run(p.tile);
   check(p.bench, golden::kErrorAddress | golden::kErrorShort | golden::kErrorWindow, 3, 2, 1, State::kIdle);
   CHECK(p.bench.dut.window_errors > 0);
@@ -397,7 +399,7 @@ TEST_CASE("errors: pixels before the start command wait") {
 TEST_CASE("errors: counters of window errors saturate") {
   Prepared p;
   // 16x12 cells, 12 planes, nothing loaded but one pixel: 20*16*12 lost samples a tile, so 18 tiles pass 65535.
-  Stimulus s = p.maker.make(Texture::kConstant, Geometry::kInside, 16, 12, 12);
+  scene::Stimulus s = p.maker.make(scene::Texture::kConstant, scene::Geometry::kInside, 16, 12, 12);
   s.job.win_cols = s.job.win_rows = 1;
   s.left = s.right = golden::Pixels(1, 1);
   for (int i = 0; i < 19; ++i) p.bench.run(s);

@@ -6,12 +6,12 @@
 #include "contract/registers.hpp"
 #include "core/error.hpp"
 #include "engine/configurations.hpp"
-#include "engine/stimulus.hpp"
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "plan/planner.hpp"
 #include "reference/reference.hpp"
 #include "scene/scene.hpp"
+#include "scene/stimulus.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 
@@ -165,13 +165,14 @@ TEST_CASE("rtl engine: extreme formats, random tiles") {
   const char* name = GENERATE("wide", "narrow", "odd");
   INFO("configuration " << name << " seed " << test_seed());
   const rtl::Configuration& c = configuration(name);
-  StimulusMaker maker(c.config, test_seed());
+  scene::StimulusMaker maker(c.config, test_seed());
   rtl::RtlEngine engine(c);
   Scoreboard cells("cell");
   for (int tile = 0; tile < 40; ++tile) {
     const int planes = tile == 0 ? c.config.planes : 1 + maker.below(std::min(c.config.planes, 40));
-    const Stimulus s = maker.make(static_cast<Texture>(tile % 5), static_cast<Geometry>(maker.below(4)),
-                                  1 + maker.below(c.config.plane_cols), 1 + maker.below(c.config.plane_rows), planes);
+    const scene::Stimulus s =
+        maker.make(static_cast<scene::Texture>(tile % 5), static_cast<scene::Geometry>(maker.below(4)),
+                   1 + maker.below(c.config.plane_cols), 1 + maker.below(c.config.plane_rows), planes);
     engine.set_table(s.table);
     const auto out = engine.run(s.job, s.left, s.right);
     const auto model = golden::run_tile(c.config, s.job, s.table, s.left, s.right);
@@ -188,9 +189,9 @@ TEST_CASE("rtl engine: extreme formats, random tiles") {
 
 TEST_CASE("rtl engine: clocks and errors of a tile, table kept from tile to tile") {
   const rtl::Configuration& c = configuration("tiny");
-  StimulusMaker maker(c.config, test_seed());
+  scene::StimulusMaker maker(c.config, test_seed());
   rtl::RtlEngine engine(c);
-  const Stimulus s = maker.make(Texture::kStereo, Geometry::kInside, 16, 12, 12);
+  const scene::Stimulus s = maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 16, 12, 12);
   engine.set_table(s.table);
   const auto model = golden::run_tile(c.config, s.job, s.table, s.left, s.right);
   const auto first = engine.run(s.job, s.left, s.right);
@@ -201,7 +202,7 @@ TEST_CASE("rtl engine: clocks and errors of a tile, table kept from tile to tile
   CHECK(first.all_clocks > second.all_clocks + 8 * 12 - 1);  // the table is written once
   CHECK(first.errors == 0);
 
-  const Stimulus lost = maker.make(Texture::kStereo, Geometry::kLost, 16, 12, 12);
+  const scene::Stimulus lost = maker.make(scene::Texture::kStereo, scene::Geometry::kLost, 16, 12, 12);
   engine.set_table(lost.table);
   const auto out = engine.run(lost.job, lost.left, lost.right);
   const auto lost_model = golden::run_tile(c.config, lost.job, lost.table, lost.left, lost.right);
@@ -212,9 +213,9 @@ TEST_CASE("rtl engine: clocks and errors of a tile, table kept from tile to tile
 
 TEST_CASE("rtl engine: a refused tile throws with the reason, the engine works on") {
   const rtl::Configuration& c = configuration("tiny");
-  StimulusMaker maker(c.config, test_seed());
+  scene::StimulusMaker maker(c.config, test_seed());
   rtl::RtlEngine engine(c);
-  const Stimulus s = maker.make(Texture::kStereo, Geometry::kInside, 8, 8, 5);
+  const scene::Stimulus s = maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 8, 8, 5);
   const auto model = golden::run_tile(c.config, s.job, s.table, s.left, s.right);
   CHECK_THROWS_WITH(engine.run(s.job, s.left, s.right), contains("errors: table"));
   engine.set_table(s.table);
@@ -232,8 +233,8 @@ TEST_CASE("rtl engine: a refused tile throws with the reason, the engine works o
 
 TEST_CASE("rtl engine: threads change nothing, an exception in a worker comes out") {
   const rtl::Configuration& c = configuration("tiny");
-  StimulusMaker maker(c.config, test_seed());
-  const Stimulus s = maker.make(Texture::kStereo, Geometry::kInside, 16, 12, 6);
+  scene::StimulusMaker maker(c.config, test_seed());
+  const scene::Stimulus s = maker.make(scene::Texture::kStereo, scene::Geometry::kInside, 16, 12, 6);
   const auto model = golden::run_tile(c.config, s.job, s.table, s.left, s.right);
   for (int threads : {1, 3, 0}) {
     std::vector<int> seen(7, 0);

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "core/error.hpp"
+#include "forecast/link_plan.hpp"
 #include "golden/control.hpp"
-#include "plan/link_plan.hpp"
 #include "plan/planner.hpp"
 #include "scene/scene.hpp"
 #include "support/catch.hpp"

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kCols = 10, kRows = 7;
 
-// Format of tb/configs/tiny.json, three planes.
+// Format of rtl/configs/engine/tiny.json, three planes.
 SweepSetup example_setup() {
   SweepSetup s;
   s.rig.width = kCols;

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "chip/chip_model.hpp"
+#include "desk/chip_model.hpp"
 #include "replay/recording.hpp"
 
 namespace psweep::chip {

@@ -7,12 +7,12 @@
 #include <exception>
 #include <random>
 
-#include "chip/chip_transport.hpp"
-#include "chip/chips.hpp"
-#include "chip/station.hpp"
+#include "desk/chip_transport.hpp"
+#include "desk/station.hpp"
 #include "net/client.hpp"
 #include "net/link_engine.hpp"
 #include "replay/chip_recorder.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;

@@ -26,9 +26,9 @@ class Session {
   Session(const golden::Config& config, uint32_t seed)
       : config_(config), bench_(config, seed, {0.2, 0.3, 0.3}), maker_(config, seed) {}
 
-  void good(Texture texture, Geometry geometry) { bench_.run(make(texture, geometry)); }
+  void good(scene::Texture texture, scene::Geometry geometry) { bench_.run(make(texture, geometry)); }
   void refused() {
-    const Stimulus s = make(Texture::kRandom, Geometry::kInside);
+    const scene::Stimulus s = make(scene::Texture::kRandom, scene::Geometry::kInside);
     bench_.write(0x0007, 1);  // unknown register
     bench_.write_job(s.job);
     bench_.write(golden::kRegTileCols, static_cast<uint32_t>(config_.plane_cols) + 1);
@@ -39,7 +39,7 @@ class Session {
           (golden::kErrorAddress | golden::kErrorConfig));
   }
   void wrong_length(bool long_packet) {
-    const Stimulus s = make(Texture::kRandom, Geometry::kInside);
+    const scene::Stimulus s = make(scene::Texture::kRandom, scene::Geometry::kInside);
     bench_.write_table(s.table);
     bench_.write_job(s.job);
     bench_.command(golden::kCommandStart);
@@ -49,7 +49,7 @@ class Session {
     CHECK((bench_.dut.errors & (long_packet ? golden::kErrorLong : golden::kErrorShort)) != 0);
   }
   void interrupted(State state, bool by_reset) {
-    const Stimulus s = make(Texture::kStereo, Geometry::kInside);
+    const scene::Stimulus s = make(scene::Texture::kStereo, scene::Geometry::kInside);
     bench_.write_table(s.table);
     bench_.write_job(s.job);
     bench_.command(golden::kCommandStart);
@@ -73,7 +73,7 @@ class Session {
   }
   void any(uint64_t most_clocks) {
     for (;;) {
-      const Stimulus s = maker_.any();
+      const scene::Stimulus s = maker_.any();
       if (golden::engine_clocks(config_, s.job) > most_clocks) continue;
       bench_.run(s);
       return;
@@ -82,12 +82,12 @@ class Session {
 
  private:
   // Small, since GHDL does some thousand clocks a second; a last set of planes that does not fill all lanes.
-  Stimulus make(Texture texture, Geometry geometry) {
+  scene::Stimulus make(scene::Texture texture, scene::Geometry geometry) {
     const int planes = std::min(config_.planes, config_.lanes + 1);
     for (;;) {
       const int cols = std::min(config_.plane_cols, 2 + maker_.below(5)),
                 rows = std::min(config_.plane_rows, 1 + maker_.below(4));
-      const Stimulus s = maker_.make(texture, geometry, cols, rows, planes);
+      const scene::Stimulus s = maker_.make(texture, geometry, cols, rows, planes);
       if (s.job.win_rows < rows + config_.window + 2) return s;  // few rows that nobody looks at
     }
   }
@@ -99,7 +99,7 @@ class Session {
 
   golden::Config config_;
   EngineBench<RecordedPsweep> bench_;
-  StimulusMaker maker_;
+  scene::StimulusMaker maker_;
 };
 
 }  // namespace
@@ -117,17 +117,17 @@ TEST_CASE("record: a session of good, refused, cut and aborted tiles") {
   RecordedPsweep::recorder = &recorder;
   {
     Session session(e.config, test_seed());
-    session.good(Texture::kStereo, Geometry::kInside);
+    session.good(scene::Texture::kStereo, scene::Geometry::kInside);
     session.refused();
-    session.good(Texture::kRandom, Geometry::kSkewed);
+    session.good(scene::Texture::kRandom, scene::Geometry::kSkewed);
     session.wrong_length(false);
     session.wrong_length(true);
-    session.good(Texture::kSaturated, Geometry::kLost);
+    session.good(scene::Texture::kSaturated, scene::Geometry::kLost);
     for (const State state : {State::kLoad, State::kSweep, State::kUnload}) session.interrupted(state, false);
-    session.good(Texture::kConstant, Geometry::kBorder);
-    session.good(Texture::kFaint, Geometry::kInside);
+    session.good(scene::Texture::kConstant, scene::Geometry::kBorder);
+    session.good(scene::Texture::kFaint, scene::Geometry::kInside);
     session.interrupted(State::kSweep, true);
-    session.good(Texture::kStereo, Geometry::kBorder);
+    session.good(scene::Texture::kStereo, scene::Geometry::kBorder);
     for (int i = 0; i < tiles; ++i) session.any(most_clocks);
   }
   RecordedPsweep::recorder = nullptr;

@@ -8,10 +8,10 @@
 #include <random>
 #include <stdexcept>
 
-#include "chip/chips.hpp"
-#include "chip/station.hpp"
+#include "desk/station.hpp"
 #include "net/link_engine.hpp"
 #include "replay/chip_recorder.hpp"
+#include "verilated/chips.hpp"
 
 using namespace psweep;
 using namespace psweep::chip;

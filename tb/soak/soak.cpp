@@ -65,14 +65,14 @@ class Session {
     return {cfg, pix, map};
   }
   // Small ones: many tiles say more than large ones.
-  Stimulus make() {
+  scene::Stimulus make() {
     for (;;) {
-      const Stimulus s = maker_.any();
+      const scene::Stimulus s = maker_.any();
       if (golden::engine_clocks(config_, s.job) < 4000 || maker_.below(200) == 0) return s;
     }
   }
   void good() {
-    const Stimulus s = make();
+    const scene::Stimulus s = make();
     what_ = s.name;
     bench_.run(s);
     ++counts_.good;
@@ -88,7 +88,7 @@ class Session {
     expected_.error_count += count;
     counts_.errors += count;
   }
-  void prepare(const Stimulus& s) {
+  void prepare(const scene::Stimulus& s) {
     bench_.write_table(s.table);
     bench_.write_job(s.job);
   }
@@ -99,7 +99,7 @@ class Session {
   }
 
   void refused() {
-    const Stimulus s = make();
+    const scene::Stimulus s = make();
     what_ = "refused, " + s.name;
     prepare(s);
     struct Bad {
@@ -124,7 +124,7 @@ class Session {
     ++counts_.refused;
   }
   void wrong_length(bool too_long) {
-    Stimulus s = make();
+    scene::Stimulus s = make();
     while (s.left.data.size() < 2) s = make();
     what_ = (too_long ? "long packet, " : "short packet, ") + s.name;
     prepare(s);
@@ -145,7 +145,7 @@ class Session {
   }
   // An abort or a reset in a random clock of the tile, or just before or behind it.
   void interrupted(bool by_reset) {
-    const Stimulus s = make();
+    const scene::Stimulus s = make();
     what_ = (by_reset ? "reset, " : "abort, ") + s.name;
     prepare(s);
     bench_.flush_cfg();
@@ -194,7 +194,7 @@ class Session {
   }
   // Only behind a reset is the table empty: a tile that needs a word more than was written.
   void missing_table() {
-    const Stimulus s = make();
+    const scene::Stimulus s = make();
     what_ = "table too short, " + s.name;
     auto words = golden::table_writes(s.table);
     words.pop_back();
@@ -231,7 +231,7 @@ class Session {
   }
   // Writes and starts while the tile waits for its pixels: refused, and the tile is right.
   void disturbed() {
-    const Stimulus s = make();
+    const scene::Stimulus s = make();
     what_ = "disturbed, " + s.name;
     prepare(s);
     bench_.flush_cfg();
@@ -279,7 +279,7 @@ class Session {
   };
   golden::Config config_;
   Counts& counts_;
-  StimulusMaker maker_;
+  scene::StimulusMaker maker_;
   EngineBench<replay::RecordedPsweep> bench_;
   Status expected_;
   std::string what_;

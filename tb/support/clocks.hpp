@@ -81,15 +81,13 @@ class Clocks {
     context_.randReset(2);
     context_.randSeed(static_cast<int>(seed | 1));  // 0 would mean: from the clock
     dut_ = std::make_unique<Dut>(&context_);
-    open_wave(wave);
+    open_wave(wave_, *dut_, wave);
   }
   Clocks(const Clocks&) = delete;
   Clocks& operator=(const Clocks&) = delete;
   ~Clocks() {
-#if VM_TRACE
-    if (trace_) trace_->close();
-#endif
-    save_coverage(context_);
+    wave_.close();
+    simulator::save_coverage(context_);
     dut_->final();
   }
 
@@ -166,38 +164,20 @@ class Clocks {
  private:
   static constexpr double kTogether = 1e-3;
 
-  void open_wave([[maybe_unused]] std::string wave) {
-#if VM_TRACE
-    static const char* from_environment = std::getenv("PSWEEP_WAVE");
-    if (wave.empty() && from_environment) {
-      wave = from_environment;
-      from_environment = nullptr;
-    }
-    if (wave.empty()) return;
-    context_.traceEverOn(true);
-    trace_ = std::make_unique<VerilatedFstC>();
-    dut_->trace(trace_.get(), 99);
-    trace_->open(wave.c_str());
-#endif
-  }
   void dump() {
     const auto at = static_cast<uint64_t>(std::llround(now_));
-#if VM_TRACE
     // The file wants time to advance: edges of one picosecond become one entry.
-    if (trace_ && (at > dumped_ || !any_dumped_)) trace_->dump(at);
+    if (at > dumped_ || !any_dumped_) wave_.dump(at);
     any_dumped_ = true;
     dumped_ = at;
-#endif
     context_.time(at);
   }
 
   VerilatedContext context_;
   std::unique_ptr<Dut> dut_;
-#if VM_TRACE
-  std::unique_ptr<VerilatedFstC> trace_;
+  simulator::Wave<Dut> wave_;
   uint64_t dumped_ = 0;
   bool any_dumped_ = false;
-#endif
   std::vector<std::unique_ptr<ClockDomain>> domains_;
   std::vector<ClockDomain*> rising_;
   double timeout_, now_ = 0;

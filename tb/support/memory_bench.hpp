@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "simulator/coverage.hpp"
 #include "support/catch.hpp"
-#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 namespace psweep::tb {
@@ -28,7 +28,7 @@ class MemoryBench {
     dut_ = std::make_unique<Dut>(&context_);
   }
   ~MemoryBench() {
-    save_coverage(context_);
+    simulator::save_coverage(context_);
     dut_->final();
   }
 

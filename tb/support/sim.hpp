@@ -10,9 +10,7 @@
 //   models built with TRACE.
 #pragma once
 #include <verilated.h>
-#if VM_TRACE
-#include <verilated_fst_c.h>
-#endif
+
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
@@ -20,7 +18,8 @@
 #include <string>
 #include <vector>
 
-#include "support/coverage.hpp"
+#include "simulator/coverage.hpp"
+#include "simulator/wave.hpp"
 
 namespace psweep::tb {
 
@@ -36,9 +35,26 @@ struct CycleCounter {
   virtual uint64_t cycle() const = 0;
 };
 
+// The name in PSWEEP_WAVE, the first time; then nothing.
+inline std::string wave_from_environment() {
+  static bool taken = false;
+  const char* const name = taken ? nullptr : std::getenv("PSWEEP_WAVE");
+  taken = true;
+  return name ? name : "";
+}
+
 struct Timeout : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+// Opens the waves that are asked for; without a name those of PSWEEP_WAVE, once in a program.
+template <class Dut>
+void open_wave(simulator::Wave<Dut>& wave, Dut& dut, std::string file) {
+  if constexpr (simulator::Wave<Dut>::kBuiltIn) {
+    if (file.empty()) file = wave_from_environment();
+    if (!file.empty()) wave.open(dut, file);
+  }
+}
 
 template <class Dut>
 class Sim : public CycleCounter {
@@ -47,17 +63,15 @@ class Sim : public CycleCounter {
     context_.randReset(2);
     context_.randSeed(static_cast<int>(seed | 1));  // 0 would mean: from the clock
     dut_ = std::make_unique<Dut>(&context_);
-    open_wave(wave);
+    open_wave(wave_, *dut_, wave);
     dut_->clk = 0;
     dut_->rst = 1;
   }
   Sim(const Sim&) = delete;
   Sim& operator=(const Sim&) = delete;
   ~Sim() override {
-#if VM_TRACE
-    if (trace_) trace_->close();
-#endif
-    save_coverage(context_);
+    wave_.close();
+    simulator::save_coverage(context_);
     dut_->final();
   }
 
@@ -97,32 +111,14 @@ class Sim : public CycleCounter {
     dut_->eval();
     dump();
   }
-  void open_wave([[maybe_unused]] std::string wave) {
-#if VM_TRACE
-    static const char* from_environment = std::getenv("PSWEEP_WAVE");
-    if (wave.empty() && from_environment) {
-      wave = from_environment;
-      from_environment = nullptr;
-    }
-    if (wave.empty()) return;
-    context_.traceEverOn(true);
-    trace_ = std::make_unique<VerilatedFstC>();
-    dut_->trace(trace_.get(), 99);
-    trace_->open(wave.c_str());
-#endif
-  }
   void dump() {
-#if VM_TRACE
-    if (trace_) trace_->dump(static_cast<uint64_t>(context_.time()));
-#endif
+    wave_.dump(context_.time());
     context_.timeInc(1);
   }
 
   VerilatedContext context_;
   std::unique_ptr<Dut> dut_;
-#if VM_TRACE
-  std::unique_ptr<VerilatedFstC> trace_;
-#endif
+  simulator::Wave<Dut> wave_;
   std::vector<Agent*> agents_;
   uint64_t timeout_, cycle_ = 0;
 };

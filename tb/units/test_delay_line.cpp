@@ -9,8 +9,8 @@
 #include "Vdelay_line_1_40.h"
 #include "Vdelay_line_7_1.h"
 #include "Vdelay_line_9_13.h"
+#include "simulator/coverage.hpp"
 #include "support/catch.hpp"
-#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -43,7 +43,7 @@ void random_words(unsigned width, size_t delay, double enabled) {
     if (way.size() > delay) way.pop_front();
     if (way.size() == delay) board.compare(dut.m_data, way.front(), {}, clock);
   }
-  save_coverage(context);
+  simulator::save_coverage(context);
   dut.final();
   INFO(board.report());
   CHECK(board.ok());

@@ -9,8 +9,8 @@
 #include "Vdivider_2_1.h"
 #include "Vdivider_6_9.h"
 #include "golden/similarity.hpp"
+#include "simulator/coverage.hpp"
 #include "support/catch.hpp"
-#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -30,7 +30,7 @@ struct Bench {
 
   Bench(int num_width, int quot_width) : num_bits(num_width), quot_bits(quot_width) { dut.clk = 0; }
   ~Bench() {
-    save_coverage(context);
+    simulator::save_coverage(context);
     dut.final();
   }
 

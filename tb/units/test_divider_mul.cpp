@@ -15,8 +15,8 @@
 #include "Vdivider_mul_7.h"
 #include "Vdivider_mul_8.h"
 #include "golden/similarity.hpp"
+#include "simulator/coverage.hpp"
 #include "support/catch.hpp"
-#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -38,7 +38,7 @@ struct Bench {
 
   explicit Bench(int quot_bits) : bits(quot_bits), lowest(int64_t{4} << quot_bits), end(2 * lowest) { dut.clk = 0; }
   ~Bench() {
-    save_coverage(context);
+    simulator::save_coverage(context);
     dut.final();
   }
 

@@ -10,8 +10,8 @@
 
 #include "Vram_2r_a.h"
 #include "Vram_2r_deep.h"
+#include "simulator/coverage.hpp"
 #include "support/catch.hpp"
-#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -65,7 +65,7 @@ void run(uint32_t depth, const std::vector<uint32_t>& places, uint32_t around) {
     dut.clk = 1;
     dut.eval();
   }
-  save_coverage(context);
+  simulator::save_coverage(context);
   dut.final();
   INFO(a.report() << b.report());
   CHECK((a.ok() && b.ok()));

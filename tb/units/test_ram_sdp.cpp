@@ -9,8 +9,8 @@
 
 #include "Vram_sdp_1.h"
 #include "Vram_sdp_2.h"
+#include "simulator/coverage.hpp"
 #include "support/catch.hpp"
-#include "support/coverage.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
@@ -64,7 +64,7 @@ void random_traffic(unsigned latency) {
     dut.clk = 1;
     dut.eval();
   }
-  save_coverage(context);
+  simulator::save_coverage(context);
   dut.final();
   INFO(board.report());
   CHECK(board.ok());
