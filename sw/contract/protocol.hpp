@@ -2,6 +2,7 @@
 // Messages between host and chip: constants, and the fields of a message as bytes. Prose: docs/protocol.md.
 // Everything is big endian. No I/O here; used by the host, by the chip's model and by the bench.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -171,6 +172,12 @@ struct ArbiterConfig {
   int chunk_cells() const { return chunk_bytes / cell_bytes(); }
   int slots() const {
     return row_slots > 0 ? row_slots : (engine.img_cols * engine.img_rows + chunk_pairs() - 1) / chunk_pairs();
+  }
+  int largest_map() const { return engine.plane_cols * engine.plane_rows; }  // cells
+  // Of the map buffer, in cells: whole chunks, or the largest map.
+  int depth() const {
+    if (map_depth <= 0 || map_depth >= largest_map()) return largest_map();
+    return std::max(2, (map_depth + chunk_cells() - 1) / chunk_cells()) * chunk_cells();
   }
 };
 

@@ -93,6 +93,11 @@ inline uint32_t pixel_beat(const Config& c, const Pixels& left, const Pixels& ri
   return pixel_beat(c, left.data[i], right.data[i]);
 }
 
+inline void unpack_beat(const Config& c, uint32_t beat, uint16_t& left, uint16_t& right) {
+  left = static_cast<uint16_t>(beat & ((1u << c.pix_bits) - 1));
+  right = static_cast<uint16_t>(beat >> c.pix_bits);
+}
+
 // m_map_tdata = {mask(3:0), plane, frac, v}
 inline MapCell unpack_cell(const Config& c, uint64_t word) {
   auto take = [&word](int bits) {

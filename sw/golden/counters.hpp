@@ -21,8 +21,10 @@ class Counters {
     const auto n = static_cast<size_t>(event);
     if (previous_[n] != 0 && clock + 1 - previous_[n] < spacing()) throw std::logic_error("counters: pulses too close");
     previous_[n] = clock + 1;
-    ++values_[n];
+    count(event);
   }
+  // So many pulses, far enough apart.
+  void count(int event, uint32_t pulses = 1) { values_[static_cast<size_t>(event)] += pulses; }
   uint32_t value(int event) const { return values_[static_cast<size_t>(event)]; }
 
  private:

@@ -35,7 +35,7 @@ class RowBuffer {
     pixels_ = pixels;
     chunks_ = chunks;
     there_.assign(static_cast<size_t>(chunks), false);
-    pairs_.assign(static_cast<size_t>(chunks) * static_cast<size_t>(chunk_pairs_), 0);
+    pairs_.clear();
   }
 
   Answer check(int chunk) const {
@@ -46,6 +46,8 @@ class RowBuffer {
   // Bytes of the chunk, {left, right} of each pair big endian; bits above the pair are ignored.
   void store(int chunk, const std::vector<uint8_t>& bytes) {
     if (check(chunk) != Answer::kNew || bytes.size() != chunk_bytes()) throw std::logic_error("row buffer: not new");
+    const size_t end = static_cast<size_t>(chunk + 1) * static_cast<size_t>(chunk_pairs_);
+    if (pairs_.size() < end) pairs_.resize(end, 0);
     size_t at = 0;
     for (int i = 0; i < chunk_pairs_; ++i) {
       uint32_t pair = 0;
@@ -77,6 +79,7 @@ class RowBuffer {
     const uint32_t mask = (1u << pix_bits_) - 1;
     return (pairs_[pixel] & mask) << pix_bits_ | pairs_[pixel] >> pix_bits_;
   }
+  int chunks() const { return chunks_; }
   // Chunks sent when n pixels have been: the last one counts when it is as long as the tile needs it.
   int chunks_of(uint32_t n) const { return n == pixels_ ? chunks_ : static_cast<int>(n) / chunk_pairs_; }
 
