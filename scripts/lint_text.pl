@@ -148,9 +148,10 @@ sub check_units {
     my ($file) = @_;
     my ($unit) = $file =~ m{([^/]*)\.vhd$};
     return if $unit =~ /_pkg$/;
-    my %places = (golden => "sw/golden/$unit.hpp", test => "tb/units/test_$unit.cpp", page => "docs/$unit.md");
+    my %places = (golden => ["sw/golden/$unit.hpp"], page => ["docs/$unit.md"],
+        test => [ map { "tb/$_/test_$unit.cpp" } qw(units engine chip) ]);
     for my $rule (sort keys %places) {
-        finding($file, 1, $rule, "$places{$rule} is missing") unless -e $places{$rule};
+        finding($file, 1, $rule, "$places{$rule}[0] is missing") unless grep { -e } @{ $places{$rule} };
     }
 }
 

@@ -3,8 +3,8 @@
 
 Cheapest first: the entity's own test; then one small engine (or chip) under random tiles (or frames), for which only
 that engine is built; then the tests of the whole engine or chip. Waves are left out of these builds, so the case of
-test_chip that opens some is, too; and so are the two largest engines. Last the original VHDL in GHDL, which checks
-bounds and assertions: a recording of the mutant, replayed on the mutant."""
+test_psweep_top that opens some is, too; and so are the two largest engines. Last the original VHDL in GHDL, which
+checks bounds and assertions: a recording of the mutant, replayed on the mutant."""
 import hashlib
 import re
 from collections.abc import Callable
@@ -51,8 +51,8 @@ def _program(folder: str, name: str, top: str, *arguments: str) -> Test:
 ENGINE = (
     _soak("tiny"),
     _soak("odd_2"),
-    _program("engine", "test_errors", "psweep"),
-    _program("engine", "test_engine", "psweep"),
+    _program("engine", "test_control", "psweep"),
+    _program("engine", "test_psweep", "psweep"),
     _program("engine", "test_rtl_engine", "psweep", "rtl engine: extreme*"),
     _ctest("elaboration", "^psweep: G_", (), (), "psweep"),
     _ctest("replay of engines", "^replay: (tiny|odd|rectified),", ("record_engine", "psweep_replay"),
@@ -62,19 +62,20 @@ _CHIP_FIRST = (
     Test("fuzz of tiny_min", "chip_tiny_min", ("test_fuzz",), ("tb/chip/test_fuzz", "-a"), True, False,
          ("tb/chip/test_fuzz.cpp",), "psweep_top", (("PSWEEP_FUZZ_CHIP", "tiny_min"), ("PSWEEP_FUZZ_FRAMES", "1000")),
          ("rtl/configs/engine/tiny_9.json", "rtl/configs/chip/tiny_min.json")),
-    Test("pairs on tiny", "chip_tiny", ("test_chip",),
-         ("tb/chip/test_chip", "-a", "chip: half duplex*,chip: reset in the*,chip: clocks of the*,chip: another host*"),
-         True, False, ("tb/chip/test_chip.cpp",), "psweep_top", (),
+    Test("pairs on tiny", "chip_tiny", ("test_psweep_top",),
+         ("tb/chip/test_psweep_top", "-a",
+          "chip: half duplex*,chip: reset in the*,chip: clocks of the*,chip: another host*"),
+         True, False, ("tb/chip/test_psweep_top.cpp",), "psweep_top", (),
          ("rtl/configs/engine/tiny.json", "rtl/configs/chip/tiny.json")),
     _program("chip", "test_fuzz", "psweep_top"),
-    _program("chip", "test_chip", "psweep_top", "~chip: recording*"),
+    _program("chip", "test_psweep_top", "psweep_top", "~chip: recording*"),
 )
 _CHIP_LAST = (
     _ctest("replay of the chip odd", "^replay: chip_odd,", ("record_chip", "psweep_top_replay"),
            ("tb/replay/record_chip.cpp",), "psweep_top"),
 )
 # Tests of the link alone, of the forecast, of speed and of the host; and those above.
-_NOT_OF_THE_CHIP = {"test_link", "test_goodput", "test_link_plan_chip", "test_host", "test_fuzz", "test_chip"}
+_NOT_OF_THE_CHIP = {"test_link", "test_goodput", "test_link_plan_chip", "test_host", "test_fuzz", "test_psweep_top"}
 # Packages, and what has its test elsewhere.
 _OWN = {"psweep_pkg": ("address_generator", "ram_deep", "ram_2r", "storage", "updating"),
         "eth_pkg": ("mac_rx", "mac_tx", "packet_rx")}

@@ -5,6 +5,7 @@
 // offset and mirrored; all being exact integers, its numerator and denominator equal the plain ones below.
 #pragma once
 #include "contract/config.hpp"
+#include "golden/divider.hpp"
 
 namespace psweep::golden {
 
@@ -34,22 +35,6 @@ struct Sums {
   int64_t covariance(int64_t n) const { return n * x - l * r; }
   int64_t variances(int64_t n) const { return n * y - l * l - r * r; }
 };
-
-// Restoring division, one quotient bit a step: floor(num * 2^bits / den), which is all ones when num >= den.
-// Requires 0 <= num <= den, den > 0. Shared by MNCC and the depth fraction (entity divider).
-inline int divide_fraction(int64_t num, int64_t den, int bits) {
-  int quotient = 0;
-  int64_t remainder = num;
-  for (int i = 0; i < bits; ++i) {
-    remainder <<= 1;
-    quotient <<= 1;
-    if (remainder >= den) {
-      remainder -= den;
-      quotient |= 1;
-    }
-  }
-  return quotient;
-}
 
 // Both operands shifted alike, so that the leading one of den comes to bit norm_bits-1; bits that fall out are dropped.
 inline void normalise(int64_t& num, int64_t& den, int norm_bits) {

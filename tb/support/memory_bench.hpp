@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A memory with one write and one read port against an array: every word written and read, then random traffic, most of
-// it where blocks and parts begin. Words read in the clock in which they are written are undefined and not compared.
+// A memory with one write and one read port against its model: every word written and read, then random traffic, most
+// of it where blocks and parts begin. Words read in the clock in which they are written are undefined and not compared.
 #pragma once
-#include <deque>
 #include <memory>
 #include <random>
-#include <vector>
 
 #include "simulator/coverage.hpp"
 #include "support/catch.hpp"
@@ -13,16 +11,11 @@
 
 namespace psweep::tb {
 
-template <class Dut>
+template <class Dut, class Model>
 class MemoryBench {
  public:
   MemoryBench(int bits, uint32_t depth, size_t latency, uint32_t seed)
-      : depth_(depth),
-        latency_(latency),
-        mask_((uint64_t{1} << bits) - 1),
-        random_(seed),
-        memory_(depth),
-        known_(depth) {
+      : depth_(depth), latency_(latency), mask_((uint64_t{1} << bits) - 1), random_(seed), model_(depth, latency) {
     context_.randReset(2);
     context_.randSeed(static_cast<int>(seed | 1));
     dut_ = std::make_unique<Dut>(&context_);
@@ -40,16 +33,9 @@ class MemoryBench {
     set(dut_->raddr, raddr);
     dut_->clk = 0;
     dut_->eval();
-    if (way_.size() == latency_) {
-      const Read& due = way_.front();
-      if (due.known) board.compare(dut_->rdata, due.word, {-1, static_cast<int>(due.address), -1, -1}, now_);
-      way_.pop_front();
-    }
-    way_.push_back({memory_[raddr], raddr, known_[raddr] && !(we && waddr == raddr)});
-    if (we) {
-      memory_[waddr] = data;
-      known_[waddr] = true;
-    }
+    if (const auto due = model_.due(); due && due->defined)
+      board.compare(dut_->rdata, due->word, {-1, static_cast<int>(due->address), -1, -1}, now_);
+    model_.clock(we, waddr, data, raddr);
     dut_->clk = 1;
     dut_->eval();
     ++now_;
@@ -76,29 +62,21 @@ class MemoryBench {
     return at < depth_ ? at : random_() & 1 ? 0 : depth_ - 1;
   }
 
-  struct Read {
-    uint64_t word;
-    uint32_t address;
-    bool known;
-  };
-
   uint32_t depth_;
   size_t latency_;
   uint64_t mask_;
   std::mt19937 random_;
   VerilatedContext context_;
   std::unique_ptr<Dut> dut_;
-  std::vector<uint64_t> memory_;
-  std::vector<bool> known_;
-  std::deque<Read> way_;
+  Model model_;
   uint64_t now_ = 0;
 };
 
-template <class Dut>
+template <class Dut, class Model>
 void try_memory(int bits, uint32_t depth, size_t latency) {
   const uint32_t seed = test_seed();
   INFO("seed " << seed << " bits " << bits << " depth " << depth << " latency " << latency);
-  MemoryBench<Dut> bench(bits, depth, latency, seed);
+  MemoryBench<Dut, Model> bench(bits, depth, latency, seed);
   bench.everything();
   INFO(bench.board.report());
   CHECK(bench.board.ok());

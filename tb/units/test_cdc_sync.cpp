@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // cdc_sync: every bit comes out as it was sampled, exactly G_STAGES clocks later, whatever clock it comes from.
-#include <deque>
 #include <random>
 
 #include "Vcdc_sync_1_2.h"
 #include "Vcdc_sync_3_4.h"
 #include "Vcdc_sync_5_3.h"
+#include "golden/cdc_sync.hpp"
 #include "support/catch.hpp"
 #include "support/clocks.hpp"
 #include "support/scoreboard.hpp"
@@ -42,21 +42,17 @@ struct Source : Agent {
 template <class Dut>
 struct Watcher : Agent {
   Watcher(Dut& dut, const CycleCounter& clock, unsigned stages, Scoreboard& board)
-      : dut_(dut), clock_(clock), stages_(stages), board_(board) {}
+      : dut_(dut), clock_(clock), board_(board), model_(stages) {}
   void sample() override {
-    if (history_.size() == stages_) {
-      board_.compare(dut_.q, history_.front(), {}, clock_.cycle());
-      history_.pop_front();
-    }
-    history_.push_back(dut_.d);
+    if (model_.out()) board_.compare(dut_.q, *model_.out(), {}, clock_.cycle());
+    model_.clock(dut_.d);
   }
 
  private:
   Dut& dut_;
   const CycleCounter& clock_;
-  unsigned stages_;
   Scoreboard& board_;
-  std::deque<CData> history_;
+  golden::CdcSync model_;
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "Vdivider_16_13.h"
 #include "Vdivider_2_1.h"
 #include "Vdivider_6_9.h"
-#include "golden/similarity.hpp"
+#include "golden/divider.hpp"
 #include "simulator/coverage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"

@@ -14,7 +14,8 @@
 #include "Vdivider_mul_5.h"
 #include "Vdivider_mul_7.h"
 #include "Vdivider_mul_8.h"
-#include "golden/similarity.hpp"
+#include "golden/divider.hpp"
+#include "golden/divider_mul.hpp"
 #include "simulator/coverage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -115,21 +116,33 @@ TEST_CASE("divider_mul: 16 quotient bits") { run<Vdivider_mul_16>(16, 13); }
 // What the entity rests on, for all formats that it has: num * reciprocal / 2^.. is the quotient or one more.
 TEST_CASE("divider_mul: the reciprocal is near enough") {
   for (int bits = 8; bits <= 16; ++bits) {
-    const int power = 2 * bits + 5, low = bits + 2 - bits / 2;
-    const auto inverse = [&](int64_t den) { return ((int64_t{1} << power) - 1) / den + 1; };
-    for (int64_t line = 0; line < int64_t{1} << (bits / 2); ++line) {
-      const int64_t first = ((int64_t{2} << (bits / 2)) - 1 - line) << low, count = int64_t{1} << low;
-      const int64_t last = first + count - 1, base = inverse(last);
-      const int64_t slope = ((inverse(first) - base) * count + count - 2) / (count - 1);
-      int64_t least = power, most = 0;
-      for (int64_t den = first; den <= last; ++den) {
-        const int64_t reciprocal = ((base << low) + count - 1 + slope * (last - den)) >> low;
-        least = std::min(least, reciprocal * den - (int64_t{1} << power));
-        most = std::max(most, reciprocal * den - (int64_t{1} << power));
+    const golden::DividerMul model(bits);
+    const int64_t one = int64_t{1} << model.power();
+    for (int64_t line = 0; line < model.lines(); ++line) {
+      const int64_t first = model.first(line);
+      int64_t least = one, most = 0;
+      for (int64_t den = first; den < first + model.count(); ++den) {
+        const int64_t error = model.reciprocal(den) * den - one;
+        least = std::min(least, error);
+        most = std::max(most, error);
       }
       INFO("bits " << bits << " line " << line);
       REQUIRE(least >= 0);
-      REQUIRE(most < int64_t{1} << (power - bits));
+      REQUIRE(most < one >> bits);
+    }
+  }
+}
+
+TEST_CASE("divider_mul: the model by multiplication is the one by division") {
+  std::mt19937 random(test_seed());
+  for (int bits = 8; bits <= 16; ++bits) {
+    const golden::DividerMul model(bits);
+    const int64_t lowest = int64_t{4} << bits;
+    for (int i = 0; i < 20000; ++i) {
+      const int64_t den = lowest + static_cast<int64_t>(random()) % lowest;
+      const int64_t num = i % 16 == 0 ? den : static_cast<int64_t>(random()) % den;
+      INFO("bits " << bits << ": " << num << " / " << den);
+      REQUIRE(model.quotient(num, den) == golden::divide_fraction(num, den, bits));
     }
   }
 }

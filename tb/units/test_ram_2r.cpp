@@ -2,14 +2,13 @@
 // ram_2r, depth no power of two, of one part and of three: both ports return what was written last, two clocks after
 // the address, while the first one writes now and then. Words read in the clock in which they are written are undefined
 // and not compared.
-#include <array>
-#include <deque>
 #include <random>
 #include <type_traits>
 #include <vector>
 
 #include "Vram_2r_a.h"
 #include "Vram_2r_deep.h"
+#include "golden/ram_2r.hpp"
 #include "simulator/coverage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -22,7 +21,6 @@ namespace {
 // Addresses: `around` words on both sides of each of these places.
 template <class Dut>
 void run(uint32_t depth, const std::vector<uint32_t>& places, uint32_t around) {
-  constexpr size_t kLatency = 2;
   const uint32_t seed = test_seed();
   INFO("seed " << seed);
   // The entity has no reset, so it cannot live in Sim.
@@ -33,12 +31,7 @@ void run(uint32_t depth, const std::vector<uint32_t>& places, uint32_t around) {
   std::mt19937 random(seed);
   Scoreboard a("a_rdata"), b("b_rdata");
 
-  struct Read {
-    bool known;
-    uint32_t value;
-  };
-  std::array<std::deque<Read>, 2> pending;
-  std::vector<Read> memory(depth, {false, 0});
+  golden::Ram2r model(depth);
   auto address = [&] {
     const uint32_t place = places[static_cast<uint32_t>(random()) % places.size()];
     return (place + depth - around + static_cast<uint32_t>(random()) % (2 * around)) % depth;
@@ -52,16 +45,9 @@ void run(uint32_t depth, const std::vector<uint32_t>& places, uint32_t around) {
     dut.a_wdata = static_cast<SData>(random() & 0x1fff);
     dut.clk = 0;
     dut.eval();
-    const std::array<uint32_t, 2> shown = {dut.a_rdata, dut.b_rdata};
-    for (size_t port = 0; port < 2; ++port) {
-      if (pending[port].size() < kLatency) continue;
-      const Read want = pending[port].front();
-      pending[port].pop_front();
-      if (want.known) (port == 0 ? a : b).compare(shown[port], want.value, {}, clock);
-    }
-    pending[0].push_back(we ? Read{false, 0} : memory[a_addr]);
-    pending[1].push_back(we && a_addr == b_addr ? Read{false, 0} : memory[b_addr]);
-    if (we) memory[a_addr] = {true, dut.a_wdata};
+    if (const auto due = model.a.due(); due && due->defined) a.compare(dut.a_rdata, due->word, {}, clock);
+    if (const auto due = model.b.due(); due && due->defined) b.compare(dut.b_rdata, due->word, {}, clock);
+    model.clock(we, a_addr, dut.a_wdata, b_addr);
     dut.clk = 1;
     dut.eval();
   }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// ram_dc against an array: random writes and reads at unrelated clocks, every word written and read.
-#include <optional>
+// ram_dc against its model: random writes and reads at unrelated clocks, every word written and read.
 #include <random>
 #include <vector>
 
 #include "Vram_dc_13_37.h"
 #include "Vram_dc_1_512.h"
 #include "Vram_dc_8_2.h"
+#include "golden/ram_dc.hpp"
 #include "support/catch.hpp"
 #include "support/clocks.hpp"
 #include "support/scoreboard.hpp"
@@ -36,46 +36,40 @@ void set(Port& port, uint64_t value) {
 
 template <class Shape>
 struct Writer : Agent {
-  Writer(typename Shape::Dut& dut, std::vector<std::optional<uint32_t>>& model, uint32_t seed)
-      : dut_(dut), model_(model), random_(seed) {}
+  Writer(typename Shape::Dut& dut, golden::RamDc& model, uint32_t seed) : dut_(dut), model_(model), random_(seed) {}
   void drive() override {
     dut_.we = random_() % 3 != 0;
     set(dut_.waddr, random_() % Shape::kDepth);
     set(dut_.wdata, random_() & ((1u << Shape::kBits) - 1));
   }
-  void sample() override {
-    if (dut_.we) model_[dut_.waddr] = dut_.wdata;
-  }
+  void sample() override { model_.write_edge(dut_.we, dut_.waddr, dut_.wdata); }
 
  private:
   typename Shape::Dut& dut_;
-  std::vector<std::optional<uint32_t>>& model_;
+  golden::RamDc& model_;
   std::mt19937 random_;
 };
 
-// Edges of the two clocks never meet here, so what the array holds at a reader's edge is the word that must come.
+// Edges of the two clocks never meet here, so what the model holds at a reader's edge is the word that must come.
 template <class Shape>
 struct Reader : Agent {
-  Reader(typename Shape::Dut& dut, const CycleCounter& clock, const std::vector<std::optional<uint32_t>>& model,
-         Scoreboard& board, uint32_t seed)
+  Reader(typename Shape::Dut& dut, const CycleCounter& clock, golden::RamDc& model, Scoreboard& board, uint32_t seed)
       : seen(Shape::kDepth), dut_(dut), clock_(clock), model_(model), board_(board), random_(seed) {}
   void drive() override { set(dut_.raddr, random_() % Shape::kDepth); }
   void sample() override {
-    if (expected_) board_.compare(dut_.rdata, *expected_, {-1, -1, static_cast<int>(address_), 0}, clock_.cycle());
-    address_ = dut_.raddr;
-    expected_ = model_[address_];
-    if (expected_) seen[address_] = true;
+    if (const auto word = model_.rdata())
+      board_.compare(dut_.rdata, *word, {-1, -1, static_cast<int>(model_.address()), 0}, clock_.cycle());
+    model_.read_edge(dut_.raddr);
+    if (model_.rdata()) seen[model_.address()] = true;
   }
   std::vector<bool> seen;
 
  private:
   typename Shape::Dut& dut_;
   const CycleCounter& clock_;
-  const std::vector<std::optional<uint32_t>>& model_;
+  golden::RamDc& model_;
   Scoreboard& board_;
   std::mt19937 random_;
-  std::optional<uint32_t> expected_;
-  unsigned address_ = 0;
 };
 
 }  // namespace
@@ -86,7 +80,7 @@ TEMPLATE_TEST_CASE("ram_dc: reads give what was written before", "", Shape13x37,
   auto& dut = clocks.dut();
   auto& w = clocks.add({"w_clk", &dut.w_clk, w_period, 17.001});
   auto& r = clocks.add({"r_clk", &dut.r_clk, 1000, 0});
-  std::vector<std::optional<uint32_t>> model(TestType::kDepth);
+  golden::RamDc model(TestType::kDepth);
   Scoreboard board("ram_dc");
   Writer<TestType> writer(dut, model, test_seed());
   Reader<TestType> reader(dut, r, model, board, test_seed() + 1);

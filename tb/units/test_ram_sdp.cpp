@@ -3,12 +3,11 @@
 // after exactly the promised number of clocks. Words read in the clock in which they are
 // written are undefined and not compared; but that the model does not return the old word, on which somebody might come
 // to rely unseen, is.
-#include <deque>
 #include <random>
-#include <vector>
 
 #include "Vram_sdp_1.h"
 #include "Vram_sdp_2.h"
+#include "golden/ram_sdp.hpp"
 #include "simulator/coverage.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
@@ -33,13 +32,7 @@ void random_traffic(unsigned latency) {
   std::mt19937 random(seed);
   Scoreboard board("rdata");
 
-  struct Read {
-    bool known;
-    uint32_t value;
-    bool collides;
-  };
-  std::deque<Read> pending;
-  std::vector<Read> memory(kDepth, {false, 0, false});
+  golden::RamSdp model(kDepth, latency);
   unsigned collisions = 0, old_words = 0;
   for (uint64_t clock = 0; clock < 20000; ++clock) {
     const bool we = random() & 1;
@@ -51,16 +44,14 @@ void random_traffic(unsigned latency) {
     dut.raddr = static_cast<CData>(raddr);
     dut.clk = 0;
     dut.eval();
-    if (pending.size() == latency) {
-      if (pending.front().known) board.compare(dut.rdata, pending.front().value, {-1, -1, -1, -1}, clock);
-      if (pending.front().collides) {
+    if (const auto due = model.due()) {
+      if (due->defined) board.compare(dut.rdata, due->word, {-1, -1, -1, -1}, clock);
+      if (due->collides) {
         ++collisions;
-        if (dut.rdata == pending.front().value) ++old_words;
+        if (dut.rdata == due->word) ++old_words;
       }
-      pending.pop_front();
     }
-    pending.push_back(we && waddr == raddr ? Read{false, memory[raddr].value, memory[raddr].known} : memory[raddr]);
-    if (we) memory[waddr] = {true, wdata, false};
+    model.clock(we, waddr, wdata, raddr);
     dut.clk = 1;
     dut.eval();
   }

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "Vreset_filter.h"
+#include "golden/reset_filter.hpp"
 #include "support/catch.hpp"
 #include "support/clocks.hpp"
 
@@ -12,8 +13,7 @@ using namespace psweep::tb;
 
 namespace {
 
-constexpr int kEdges = 16;    // that arst_n must cover
-constexpr int kLatency = 18;  // edges from arst_n to rst
+constexpr int kEdges = golden::ResetFilter::kEdges, kLatency = golden::ResetFilter::kLatency;
 
 struct Bench {
   Clocks<Vreset_filter> clocks;
@@ -43,10 +43,13 @@ TEST_CASE("reset_filter: low pulses of every length, high pulses within a reset 
       bench.dut.arst_n = static_cast<uint8_t>(level);
       bench.edges(60);
       REQUIRE(bench.dut.rst == 1 - level);
+      golden::ResetFilter model(level);
       int first = -1, count = 0;
       for (int i = 0; i < 120; ++i) {
         bench.dut.arst_n = static_cast<uint8_t>(i < length ? 1 - level : level);
         bench.edges(1);
+        model.edge(bench.dut.arst_n);
+        REQUIRE(bench.dut.rst == model.rst());
         if (bench.dut.rst != 1 - level) {
           if (first < 0) first = i + 1;
           ++count;

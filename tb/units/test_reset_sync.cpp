@@ -3,6 +3,7 @@
 #include <random>
 
 #include "Vreset_sync.h"
+#include "golden/reset_sync.hpp"
 #include "support/catch.hpp"
 #include "support/clocks.hpp"
 
@@ -16,20 +17,27 @@ TEST_CASE("reset_sync: rises at once, falls with the third edge") {
   CData ticker = 0;  // moves arst at times that have nothing to do with clk
   auto& clk = clocks.add({"clk", &dut.clk, 1000, 100});
   auto& fine = clocks.add({"fine", &ticker, 37.77});
-  dut.arst = 1;
+  golden::ResetSync model;
+  auto set = [&](bool arst) {
+    dut.arst = arst;
+    model.set(arst);
+  };
+  set(true);
   clocks.step();
   REQUIRE(dut.rst == 1);
   int late = 0, restarted = 0;
   for (int round = 0; round < 500; ++round) {
     clocks.run(fine, 1 + random() % 100);
     REQUIRE(dut.rst == 1);
-    dut.arst = 0;
+    set(false);
     // Sometimes the next reset comes before this one is over.
     const int edges = random() % 4 == 0 ? static_cast<int>(random() % 3) : 3;
     for (int i = 1; i <= edges; ++i) {
       clocks.run(clk, 1);
       INFO("seed " << test_seed() << " round " << round << " edge " << i << " at " << clocks.now());
+      model.edge();
       REQUIRE(dut.rst == (i < 3 ? 1 : 0));
+      REQUIRE(dut.rst == model.rst());
     }
     if (edges == 3) {
       clocks.run(fine, random() % 100);
@@ -39,9 +47,10 @@ TEST_CASE("reset_sync: rises at once, falls with the third edge") {
       ++restarted;
     }
     const double before = clocks.now();
-    dut.arst = 1;
+    set(true);
     dut.eval();
     REQUIRE(dut.rst == 1);
+    REQUIRE(model.rst());
     REQUIRE(clocks.now() == before);
   }
   CHECK(late > 100);

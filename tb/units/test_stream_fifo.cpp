@@ -6,6 +6,7 @@
 #include <random>
 
 #include "Vstream_fifo.h"
+#include "golden/stream_fifo.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/stream.hpp"
@@ -17,6 +18,21 @@ namespace {
 
 constexpr int kDataBits = 12;
 
+constexpr size_t kPlaces = 15;
+
+// The model, fed and emptied by what the handshakes say.
+struct Mirror : Agent {
+  Mirror(Vstream_fifo& d, const CycleCounter& c) : dut(d), clock(c) {}
+  void sample() override {
+    if (dut.m_tvalid && dut.m_tready) board.compare(dut.m_tdata, model.take(), {}, clock.cycle());
+    if (dut.s_tvalid && dut.s_tready) model.put(dut.s_tdata);
+  }
+  Vstream_fifo& dut;
+  const CycleCounter& clock;
+  golden::StreamFifo model{kPlaces};
+  Scoreboard board{"model"};
+};
+
 struct Bench {
   Sim<Vstream_fifo> sim;
   Scoreboard board{"stream_fifo"};
@@ -27,6 +43,7 @@ struct Bench {
       stream_ports(&dut.m_tvalid, &dut.m_tready, &dut.m_tdata);
   StreamDriver<Vstream_fifo, decltype(in)> driver;
   StreamMonitor<Vstream_fifo, decltype(out)> monitor;
+  Mirror mirror{dut, sim};
 
   Bench(uint32_t seed, double in_stall, double out_stall)
       : sim(200000, seed),
@@ -34,6 +51,7 @@ struct Bench {
         monitor(sim, out, seed + 1, out_stall, [this](const Beat& b) { board.observe(b.data, b.clock); }) {
     sim.add(driver);
     sim.add(monitor);
+    sim.add(mirror);
     sim.reset();
   }
 };
@@ -54,9 +72,10 @@ TEST_CASE("stream_fifo: order, completeness and protocol under stalls") {
     bench.board.expect(data);
   }
   bench.sim.run_until([&] { return bench.board.outstanding() == 0; });
-  INFO(bench.board.report());
+  INFO(bench.board.report() << bench.mirror.board.report());
   CHECK(bench.board.ok());
   CHECK(bench.board.compared() == kBeats);
+  CHECK(bench.mirror.board.ok());
   CHECK(bench.monitor.protocol_errors() == 0);
   if (in_stall == 0 && out_stall == 0) CHECK(bench.sim.cycle() == kBeats + 2);
 }
@@ -71,10 +90,12 @@ TEST_CASE("stream_fifo: empty after reset, whatever was inside") {
     bench.sim.tick();
   }
   bench.sim.run(10);
-  REQUIRE(bench.driver.sent() == 15);  // all places full
+  REQUIRE(bench.driver.sent() == kPlaces);  // all places full
+  CHECK(bench.mirror.model.size() == kPlaces);
   CHECK(bench.dut.s_tready == 0);
   CHECK(bench.dut.few == 0);
   bench.driver.clear();
+  bench.mirror.model.clear();
   bench.monitor.set_watching(false);
   bench.sim.reset();
   bench.monitor.set_watching(true);
