@@ -113,7 +113,7 @@ std::string repeated_errors(const net::LinkFigures& f) {
   return text.empty() ? "none" : text;
 }
 
-ordered_json link_report(const LinkRun& link) {
+ordered_json link_report(const net::LinkRun& link) {
   const net::LinkFigures& f = link.figures;
   const net::LinkStatistics& s = link.statistics;
   const double hertz = 1e3 * link.chip.config.clk_khz;
@@ -206,7 +206,7 @@ void depth_command(const DepthOptions& o) {
                           o.threads, o.in_flight, o.link_timeout};
     if (o.mncc_bits) request.rounding.mncc_bits = *o.mncc_bits;
     if (o.frac_bits) request.rounding.frac_bits = *o.frac_bits;
-    run = run_engine(request, left, right, [&](size_t done, size_t total) { bar.update(done, total); });
+    run = run_engine(request, {left, right}, [&](uint64_t done, uint64_t total) { bar.update(done, total); });
   }
   DepthResult& result = run.result;
   if (o.cleanup) {

@@ -1,44 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engines behind one call. fixed, rtl and the chip at the end of a link share planner and reconstruction, so only
-// the map cells themselves can differ between them.
+// The engines by name, behind plan/engine.hpp, and what a run of one has to report.
 #pragma once
-#include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 
 #include "core/result.hpp"
-#include "net/link_engine.hpp"
+#include "net/udp_engine.hpp"
+#include "plan/engine.hpp"
 #include "plan/planner.hpp"
 #include "reference/reference.hpp"
+#include "verilated/simulated_engine.hpp"
 
 namespace psweep {
-
-struct RtlFigures {
-  std::string configuration;
-  golden::Config generics;
-  uint64_t clocks = 0;           // sum over tiles, start command to last map beat
-  uint64_t clocks_in_all = 0;    // and register and plane table writes
-  uint64_t clocks_expected = 0;  // planner's formula
-};
-
-struct LinkRun {
-  std::string peer;
-  net::Capabilities chip;
-  net::LinkFigures figures;
-  net::LinkStatistics statistics;
-  uint64_t clocks_expected = 0;  // planner's formula
-};
 
 struct EngineRun {
   DepthResult result;
   double seconds = 0;                                 // of the engine alone
   int tiles = 0, largest_cols = 0, largest_rows = 0;  // 0: the engine knows no tiles (float)
   std::optional<RtlFigures> rtl;
-  std::optional<LinkRun> link;
+  std::optional<net::LinkRun> link;
 };
-
-using ProgressCall = std::function<void(size_t done, size_t total)>;
 
 struct EngineRequest {
   std::string engine;         // float, fixed, rtl, udp://HOST[:PORT]
@@ -52,11 +33,7 @@ struct EngineRequest {
   double link_timeout = 10;   // udp: seconds without any answer
 };
 
-// Errors: net::LinkError; InputError, also if no built configuration serves the request (with the command that builds
-// one).
-EngineRun run_engine(const EngineRequest& request, const Gray& left, const Gray& right, const ProgressCall& progress);
-
-// Generics of a built configuration. InputError if there is none of this name, or no RTL in this binary.
-golden::Config configuration_named(const std::string& name);
+// Errors: those of the engines, and InputError if there is none of this name.
+EngineRun run_engine(const EngineRequest& request, const StereoPair& input, const ProgressCall& progress);
 
 }  // namespace psweep
