@@ -410,8 +410,9 @@ TEST_CASE("chip: a session ends when its host falls silent, not before") {
   b.desk.run_for(silence / 2);
   // Any authentic message is a sign of life, and so is the OPEN again, whose answer was lost.
   const bool open_again = GENERATE(false, true);
-  CHECK(answer(b.station, open_again ? request(net::kOpen, 0, {1, 2, 3, 4}) : request(net::kStatus, first.token)).flags ==
-        net::kOk);
+  CHECK(
+      answer(b.station, open_again ? request(net::kOpen, 0, {1, 2, 3, 4}) : request(net::kStatus, first.token)).flags ==
+      net::kOk);
   b.desk.run_for(silence - 2 * kMillisecond);
   CHECK(b.desk.chip().session());
   b.desk.run_for(4 * kMillisecond);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // map_buffer: maps of random sizes, whole and in rings; chunks read in order, again, too early and too late; stalls on
-// both sides; forgotten in every state. Readiness in every clock and all bytes against the model. Upsets of every bit of
-// every register.
+// both sides; forgotten in every state. Readiness in every clock and all bytes against the model. Upsets of every bit
+// of every register.
 #include <random>
 
 #include "Vmap_buffer_12_7_64_64.h"
