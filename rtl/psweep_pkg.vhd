@@ -2,7 +2,7 @@
 -- psweep_pkg: constants and helpers shared by all entities of the engine.
 --   Formats   : positions sfix(13,19) in 32 bits, steps ufix(2,19) in 21 bits    (docs/numeric_contract.md)
 --   Latencies : clocks from an entity's input to its output; parents add them up, sw/golden/control.hpp mirrors them
---   Golden    : sw/contract/config.hpp (formats), sw/golden/control.hpp (states, errors, latencies)
+--   Golden    : sw/contract/*.hpp (formats, states, errors), sw/golden/control.hpp (latencies)
 library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;

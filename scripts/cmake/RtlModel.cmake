@@ -7,7 +7,8 @@
 #     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).
 #     EDIT: perl <script> IN.v OUT.v <name>.inc changes the Verilog first; the third file is its own.
 #   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
-#     ctest case: elaboration with these generics has to fail, and the message has to match.
+#     ctest case: elaboration with these generics has to fail, and the message has to match. Without MESSAGE it has to
+#     succeed.
 #
 # rtl/files.f is the one compile order: paths relative to rtl/, '#' starts a comment. A model depends on the files up
 # to and including its own entity, and is Verilated again only if the Verilog text that GHDL makes of them changes.

@@ -10,6 +10,7 @@
 
 #include "contract/registers.hpp"
 #include "simulator/coverage.hpp"
+#include "simulator/engine_driver.hpp"
 #include "verilated/engine_model.hpp"
 
 extern __thread bool psweep_inputs_changed;  // scripts/cmake/inputs_changed.cpp
@@ -25,7 +26,6 @@ class VerilatedEngine : public EngineModel {
     context_.randReset(2);
     context_.randSeed(1);
     dut_ = std::make_unique<Dut>(&context_);
-    dut_->m_map_tready = 1;
     reset();
   }
   ~VerilatedEngine() override {
@@ -47,16 +47,25 @@ class VerilatedEngine : public EngineModel {
                 2 * uint64_t(job.planes) * (uint64_t(golden::sweep_cols(config_, job)) + 64) *
                     (uint64_t(golden::sweep_rows(config_, job)) + 8);
     try {
-      write({golden::kRegCommand, golden::kCommandClear});
-      if (!table_written_) {
-        for (const auto& w : golden::table_writes(table_)) write(w);
-        table_written_ = true;
-      }
-      for (const auto& w : golden::job_writes(job)) write(w);
-      write({golden::kRegCommand, golden::kCommandStart});
+      simulator::EngineDriver<Dut> driver(*dut_, config_);
+      driver.rest();
+      auto clock = [this] {
+        low();
+        high();
+      };
+      driver.write({{golden::kRegCommand, golden::kCommandClear}}, clock);
+      driver.write(simulator::tile_words(job, table_written_ ? nullptr : &table_), clock);
+      table_written_ = true;
       TileOutput out;
       out.cells.reserve(size_t(job.tile_cols) * job.tile_rows);
-      send_pixels(job, left, right, out);
+      driver.send(left, right, [&] {
+        low();
+        const bool taken = dut_->s_pix_tready;
+        collect(out);
+        high();
+        check_deadline();
+        return taken;
+      });
       finish(out);
       out.clocks = dut_->tile_clocks;
       out.all_clocks = clock_ - first_clock;
@@ -78,8 +87,7 @@ class VerilatedEngine : public EngineModel {
  private:
   void reset() {
     dut_->rst = 1;
-    dut_->s_cfg_tvalid = 0;
-    dut_->s_pix_tvalid = 0;
+    simulator::EngineDriver<Dut>(*dut_, config_).rest();
     for (int i = 0; i < 4; ++i) {
       low();
       high();
@@ -109,31 +117,6 @@ class VerilatedEngine : public EngineModel {
     if (clock_ > deadline_)
       throw EngineError("rtl engine: hangs in state " + std::to_string(int(dut_->state)) +
                         ", errors: " + golden::error_names(dut_->errors));
-  }
-  void write(const golden::RegisterWrite& w) {
-    dut_->s_cfg_tvalid = 1;
-    dut_->s_cfg_tdata = w.word();
-    low();  // tready is always 1
-    high();
-    dut_->s_cfg_tvalid = 0;
-  }
-  void send_pixels(const golden::TileJob& job, const golden::Pixels& left, const golden::Pixels& right,
-                   TileOutput& out) {
-    const size_t count = size_t(job.win_cols) * job.win_rows;
-    dut_->s_pix_tvalid = 1;
-    for (size_t i = 0; i < count;) {
-      const unsigned beat = golden::pixel_beat(config_, left, right, i);
-      dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
-      dut_->s_pix_tlast = i + 1 == count;
-      low();
-      const bool taken = dut_->s_pix_tready;
-      collect(out);
-      high();
-      i += taken;
-      check_deadline();
-    }
-    dut_->s_pix_tvalid = 0;
-    dut_->s_pix_tlast = 0;
   }
   void finish(TileOutput& out) {
     struct Quiet {

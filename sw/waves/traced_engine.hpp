@@ -9,6 +9,7 @@
 
 #include "contract/registers.hpp"
 #include "golden/control.hpp"
+#include "simulator/engine_driver.hpp"
 #include "simulator/wave.hpp"
 #include "waves/engines.hpp"
 #include "waves/fst.hpp"
@@ -24,8 +25,7 @@ class TracedEngine {
     dut_ = std::make_unique<Dut>(&context_);
     if (!run.fst.empty()) wave_.open(*dut_, run.fst);
     dut_->clk = 1;
-    dut_->m_map_tready = 1;
-    dut_->s_cfg_tvalid = dut_->s_pix_tvalid = dut_->s_pix_tlast = 0;
+    simulator::EngineDriver<Dut>(*dut_, config).rest();
   }
   ~TracedEngine() {
     wave_.close();
@@ -37,19 +37,13 @@ class TracedEngine {
     dut_->rst = 1;
     for (int i = 0; i < 4; ++i) tick();
     dut_->rst = 0;
-    for (const auto& w : golden::table_writes(s.table)) write(w);
-    for (const auto& w : golden::job_writes(s.job)) write(w);
-    write({golden::kRegCommand, golden::kCommandStart});
+    simulator::EngineDriver<Dut> driver(*dut_, config_);
+    driver.write(simulator::tile_words(s.job, &s.table), [this] { tick(); });
     const uint64_t deadline = clock_ + 1000 + 2 * golden::engine_clocks(config_, s.job);
-    const size_t count = s.left.data.size();
-    dut_->s_pix_tvalid = 1;
-    for (size_t i = 0; i < count && clock_ < deadline;) {
-      const unsigned beat = golden::pixel_beat(config_, s.left, s.right, i);
-      dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
-      dut_->s_pix_tlast = i + 1 == count;
-      i += tick();
-    }
-    dut_->s_pix_tvalid = dut_->s_pix_tlast = 0;
+    driver.send(s.left, s.right, [&] {
+      if (clock_ >= deadline) throw WaveError("the engine does not take its pixels");
+      return tick();
+    });
     // With waves the map is of no interest any more.
     while (dut_->busy && clock_ < deadline && !(wave_.is_open() && clock_ > run_.last)) tick();
     if (dut_->busy && clock_ >= deadline) throw WaveError("the engine does not finish its tile");
@@ -74,12 +68,6 @@ class TracedEngine {
   }
   void dump(uint64_t time) {
     if (clock_ >= run_.first && clock_ <= run_.last) wave_.dump(time);
-  }
-  void write(const golden::RegisterWrite& w) {
-    dut_->s_cfg_tvalid = 1;
-    dut_->s_cfg_tdata = w.word();
-    tick();
-    dut_->s_cfg_tvalid = 0;
   }
   void look() {
     if (dut_->rst) return;

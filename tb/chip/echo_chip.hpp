@@ -8,6 +8,7 @@
 #include <random>
 
 #include "contract/frames.hpp"
+#include "core/error.hpp"
 #include "desk/chip_model.hpp"
 
 namespace psweep::chip {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // map_buffer: maps of random sizes, whole and in rings; chunks read in order, again, too early and too late; stalls on
-// both sides; forgotten in every state. Readiness in every clock and all bytes against the model.
+// both sides; forgotten in every state. Readiness in every clock and all bytes against the model. Upsets of every bit
+// of every register.
 #include <random>
 
 #include "Vmap_buffer_12_7_64_64.h"
@@ -12,10 +13,12 @@
 #include "Vmap_buffer_36_3_50_15.h"
 #include "Vmap_buffer_48_2_33_2.h"
 #include "Vmap_buffer_9_5_40_40.h"
+#include "Vmap_buffer_upset.h"
 #include "golden/map_buffer.hpp"
 #include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 #include "support/sim.hpp"
+#include "support/upset.hpp"
 
 using namespace psweep;
 using namespace psweep::tb;
@@ -286,4 +289,120 @@ TEST_CASE("map_buffer: the sizes of 44-30-13-13, whole map") {
 TEST_CASE("map_buffer: the sizes of 256 x 130 tiles, whole map and ring of 20 chunks") {
   run_tiles<Vmap_buffer_31_352_33280_33280>({31, 352, 33280, 33280}, {0.1, 0.1, 0.05, 0.0, true}, 2);
   run_tiles<Vmap_buffer_31_352_33280_7040>({31, 352, 33280, 7040}, {0.0, 0.1, 0.3, 0.0, true}, 3);
+}
+
+namespace {
+
+const std::vector<UpsetSite> kSites = {
+#include "map_buffer_upset.inc"
+};
+
+// Writes a whole map, then reads its chunks as the chip's responder does.
+struct MapHost {
+  static constexpr int kCells = 20, kChunkCells = 6, kChunks = 4, kCellBytes = 4;
+  static constexpr int kClocks = kCells + kChunks * kChunkCells * (kCellBytes + 1);  // about, of a map
+
+  Sim<Vmap_buffer_upset> sim{100000000, test_seed()};
+  Vmap_buffer_upset& dut = sim.dut();
+  std::mt19937 random{test_seed() + 41};
+  uint64_t recovered = 0;
+  int site = 0, flip_in = -1;  // the upset, and clocks until then
+  bool flipped = false;
+
+  MapHost() {
+    dut.s_tvalid = dut.release_map = dut.clear = dut.fail = dut.f_start = dut.f_take = 0;
+    dut.keep = dut.f_chunk = 0;
+    dut.flip_site = 0;
+    dut.flip_mask = 0;
+    sim.reset();
+  }
+
+  void tick() {
+    dut.flip_site = static_cast<SData>(flip_in == 0 ? site : 0);
+    flipped = flipped || flip_in == 0;
+    dut.eval();
+    recovered += dut.recovered;
+    sim.tick();
+    if (flip_in >= 0) --flip_in;
+  }
+
+  // Is the map right? An upset of that register (0: of none) so many clocks after the first cell.
+  bool map(int flip_site, int bit, int clocks) {
+    std::vector<uint8_t> sent, got;
+    site = flip_site;
+    dut.flip_mask = uint64_t{1} << bit;
+    flip_in = clocks;
+    flipped = false;
+    for (int i = 0; i < kCells; ++i) {
+      const uint32_t cell = static_cast<uint32_t>(random() & 0x7ffffff);
+      for (int k = kCellBytes - 1; k >= 0; --k) sent.push_back(static_cast<uint8_t>(cell >> 8 * k));
+      dut.s_tvalid = 1;
+      dut.s_tdata = cell;
+      dut.s_tlast = i == kCells - 1;
+      dut.eval();
+      for (int wait = 0; !dut.s_tready && wait < 20; ++wait) tick();
+      tick();
+    }
+    dut.s_tvalid = 0;
+    for (int chunk = 0; chunk < kChunks; ++chunk) {
+      dut.f_chunk = static_cast<SData>(chunk);
+      for (int i = 0; i < 4; ++i) tick();
+      if (!dut.f_ready) break;
+      dut.f_start = 1;
+      tick();
+      dut.f_start = 0;
+      bool last = false;
+      for (int i = 0; i < 200 && !last; ++i) {
+        dut.f_take = 1;
+        dut.eval();
+        if (dut.f_valid) {
+          got.push_back(dut.f_data);
+          last = dut.f_last;
+        }
+        tick();
+      }
+      dut.f_take = 0;
+    }
+    flip_in = -1;
+    return got == sent;
+  }
+
+  void forget() {
+    dut.clear = 1;
+    tick();
+    dut.clear = 0;
+    tick();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("map_buffer: no upset outlives its map, and what cannot be is told") {
+  MapHost host;
+  REQUIRE(host.map(0, 0, 0));
+  host.forget();
+  CHECK(host.recovered == 0);
+  int flips = 0, wrong = 0;
+  for (size_t site = 0; site < kSites.size(); ++site) {
+    for (int bit = 0; bit < kSites[site].bits; ++bit) {
+      for (int round = 0; round < 12; ++round) {
+        const int clocks = static_cast<int>(host.random() % MapHost::kClocks);
+        INFO("register " << kSites[site].name << " bit " << bit << ", " << clocks << " clocks after the first cell");
+        const uint64_t before = host.recovered;
+        wrong += !host.map(static_cast<int>(site) + 1, bit, clocks);
+        const std::string name = kSites[site].name;
+        // One bit of these makes a code that is no state, in every clock in which a map is here.
+        if (host.flipped && (name == "filling" || name == "complete_q" || name == "read_state"))
+          CHECK(host.recovered > before);
+        host.forget();
+        REQUIRE(host.map(0, 0, 0));
+        host.forget();
+        ++flips;
+      }
+    }
+  }
+  INFO(flips << " upsets, " << wrong << " maps wrong, recovered " << host.recovered);
+  CHECK(flips > 500);
+  CHECK(wrong > 50);
+  CHECK(host.recovered > 50);
 }

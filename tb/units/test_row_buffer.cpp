@@ -241,6 +241,10 @@ class Bench : public Agent {
   }
 
   void sample_answer(uint64_t now) {
+    // Until the next check: clear, fail and open_tile take the answer back, also one that is still on its way.
+    if (taken_back_) answers.compare(dut.w_new, 0, {tile_count_}, now);
+    if (dut.w_check) taken_back_ = false;
+    if (dut.clear || (dut.fail && gone_) || dut.open_tile) taken_back_ = true;
     if (dut.w_check) {
       answer_ = model.check(chunk_);
       answer_due_ = now + 2;
@@ -298,7 +302,7 @@ class Bench : public Agent {
   uint64_t held_data_ = 0, quiet_from_ = 0, answer_due_ = ~uint64_t{0};
   Answer answer_ = Answer::kRefused;
   size_t sent_ = 0;
-  bool late_ = false;
+  bool late_ = false, taken_back_ = false;
   std::vector<uint8_t> data_;
   std::deque<Asked> history_;
 };

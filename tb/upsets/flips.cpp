@@ -28,10 +28,10 @@
 #include "golden/control.hpp"
 #include "golden/psweep.hpp"
 #include "scene/stimulus.hpp"
+#include "simulator/engine_driver.hpp"
 #include "verilated/rtl_engine.hpp"
 
 using namespace psweep;
-using namespace psweep::tb;
 
 namespace {
 
@@ -78,6 +78,7 @@ class UpsetEngine : public Machine {
     context_.randReset(2);
     context_.randSeed(1);
     dut_ = std::make_unique<Dut>(&context_);
+    driver_ = std::make_unique<simulator::EngineDriver<Dut>>(*dut_, config);
     // The largest tile that the build knows, on streams that never wait, and a draining packet before it.
     golden::TileJob job;
     job.tile_cols = config.plane_cols, job.tile_rows = config.plane_rows, job.planes = config.planes;
@@ -90,13 +91,13 @@ class UpsetEngine : public Machine {
   void reset() override {
     dut_->flip_site = 0;
     dut_->rst = 1;
-    idle_inputs();
+    driver_->rest();
     for (int i = 0; i < 4; ++i) clock();
     dut_->rst = 0;
   }
   void abort() override {
-    idle_inputs();
-    write({golden::kRegCommand, golden::kCommandAbort});
+    driver_->rest();
+    write({{golden::kRegCommand, golden::kCommandAbort}});
     for (int i = 0; i < 4; ++i) clock();
   }
   Seen tile(const scene::Stimulus& s, bool with_table, bool refused, const Upset& upset, bool states) override {
@@ -104,27 +105,16 @@ class UpsetEngine : public Machine {
     keep_states_ = states;
     upset_ = upset;
     at_ = 0;
-    idle_inputs();
-    std::vector<golden::RegisterWrite> writes;
-    writes.push_back({golden::kRegCommand, golden::kCommandClear});
-    if (with_table)
-      for (const auto& w : golden::table_writes(s.table)) writes.push_back(w);
-    for (const auto& w : golden::job_writes(s.job)) writes.push_back(w);
-    if (refused) writes.push_back({golden::kRegTileCols, 0});
-    writes.push_back({golden::kRegCommand, golden::kCommandStart});
-    for (const auto& w : writes) write(w);
-    const size_t count = s.left.data.size();
+    driver_->rest();
+    auto words = simulator::tile_words(s.job, with_table ? &s.table : nullptr);
+    words.insert(words.begin(), {golden::kRegCommand, golden::kCommandClear});
+    if (refused) words.insert(words.end() - 1, {golden::kRegTileCols, 0});
+    write(words);
     size_t sent = 0;
     // The upset may come before the tile, and what it does may come late: a quiet time is waited for.
     const int64_t begun = at_;
     for (int quiet = 0; quiet < 40;) {
-      const bool more = sent < count;
-      dut_->s_pix_tvalid = more;
-      if (more) {
-        const unsigned beat = golden::pixel_beat(config_, s.left, s.right, sent);
-        dut_->s_pix_tdata = static_cast<std::remove_reference_t<decltype(dut_->s_pix_tdata)>>(beat);
-        dut_->s_pix_tlast = sent + 1 == count;
-      }
+      const bool more = driver_->offer(s.left, s.right, sent);
       const bool taken = more && dut_->s_pix_tready;
       collect();
       const bool busy = dut_->busy;
@@ -148,17 +138,11 @@ class UpsetEngine : public Machine {
   }
 
  private:
-  void idle_inputs() {
-    dut_->s_cfg_tvalid = 0;
-    dut_->s_pix_tvalid = 0;
-    dut_->m_map_tready = 1;
-  }
-  void write(const golden::RegisterWrite& w) {
-    dut_->s_cfg_tvalid = 1;
-    dut_->s_cfg_tdata = w.word();
-    collect();
-    clock();
-    dut_->s_cfg_tvalid = 0;
+  void write(const std::vector<golden::RegisterWrite>& words) {
+    driver_->write(words, [this] {
+      collect();
+      clock();
+    });
   }
   void clock() {
     const bool now = upset_.site > 0 && at_ == upset_.clock;
@@ -179,6 +163,7 @@ class UpsetEngine : public Machine {
   golden::Config config_;
   VerilatedContext context_;
   std::unique_ptr<Dut> dut_;
+  std::unique_ptr<simulator::EngineDriver<Dut>> driver_;
   Seen seen_;
   Upset upset_;
   int64_t at_ = 0, longest_ = 0;

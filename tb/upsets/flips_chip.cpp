@@ -32,7 +32,6 @@
 #include "scene/stimulus.hpp"
 
 using namespace psweep;
-using namespace psweep::tb;
 using net::Bytes;
 
 namespace {
