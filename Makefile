@@ -8,10 +8,6 @@ MAKEFLAGS += --no-print-directory
 BUILD := build
 export JOBS VERBOSE MINUTES T SEED SEEDS SETUP STAGE CFG PLANE CELL
 
-# Everything that `make config` passes on to scripts/make_config.cmake.
-CONFIG_KEYS := NAME WINDOW PLANE_COLS PLANE_ROWS PLANES PIX_BITS WEIGHT_BITS INTERP_FRAC MNCC_BITS FRAC_BITS \
-               IMG_COLS IMG_ROWS LANES RECTIFIED DIVIDER DISPARITY WAVES
-
 # What the vendor flows take.
 FLOW_OPTIONS = $(if $(BOARD),--board $(BOARD)) $(if $(TOP),--top $(TOP)) $(if $(CFG),--config $(CFG)) $(GENERICS)
 
@@ -150,9 +146,8 @@ real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: b
 	@scripts/real.sh '$(DATA)'
 
 .PHONY: config
-config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=256 ... (scripts/make_config.cmake)
-	@cmake -D DIR=$(BUILD)/configs $(foreach key,$(CONFIG_KEYS),$(if $($(key)),-D $(key)=$($(key)))) \
-	  -P scripts/make_config.cmake
+config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=256 ...: keys of rtl/configs/engine.schema.json
+	@scripts/configurations.py new $(filter-out JOBS=% VERBOSE=% SETUP=%,$(MAKEOVERRIDES))
 	@scripts/build.sh psweep
 
 .PHONY: bench

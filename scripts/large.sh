@@ -18,8 +18,7 @@ done
 
 # Not left behind: the command line would take it for any request that it serves.
 trap 'rm -f build/configs/large.json' EXIT
-cmake -D DIR=build/configs -D NAME=large -D PLANE_COLS=2048 -D PLANE_ROWS=2048 -D PLANES=1024 \
-  -P scripts/make_config.cmake
+scripts/configurations.py new NAME=large PLANE_COLS=2048 PLANE_ROWS=2048 PLANES=1024
 scripts/build.sh one_tile
 build/tb/engine/one_tile large "$planes"
 build/tb/engine/one_tile large 1024 64 40

@@ -17,6 +17,7 @@
 #   pages      tables of docs/dse.md are those of docs/dse/*.csv (scripts/dse/pages.py)
 #   evidence   blocks of README and docs are what docs/evidence/*.json makes of them, figures beyond them name their
 #              commit; what is stale is named, which is no failure (scripts/evidence.py)
+#   configurations  rtl/configs against the schemas, the schemas against VHDL, C++ and pages (configurations.py)
 #   arrows     folders of sw/ and tb/ use only those above them, CMake links what they include (lint_arrows.py)
 #   trace      what docs/traceability.md names exists, every requirement has a test (lint_trace.pl)
 #   verilog    Verilator -Wall on the converted engine and chip in every named configuration
@@ -90,30 +91,20 @@ check_evidence() {
   command -v python3 > /dev/null || skip "python3 is not installed" || return
   scripts/evidence.py lint
 }
+check_configurations() {
+  command -v python3 > /dev/null || skip "python3 is not installed" || return
+  scripts/configurations.py check
+}
 check_arrows() {
   command -v python3 > /dev/null || skip "python3 is not installed" || return
   scripts/lint_arrows.py --self-test && scripts/lint_arrows.py
 }
 check_trace() { scripts/lint_trace.pl; }
 
-# Keys of a configuration and the generics they become, as in sw/verilated/*.cmake.
-engine_keys=(img_cols:IMG_COLS img_rows:IMG_ROWS plane_cols:PLANE_COLS plane_rows:PLANE_ROWS planes:PLANES
-  window:WINDOW pix_bits:PIX_W weight_bits:WEIGHT_W interp_frac:INTERP_F mncc_bits:MNCC_W frac_bits:FRAC_W
-  lanes:LANES rectified:RECTIFIED divider:DIVIDER)
-arbiter_keys=(clk_khz:CLK_KHZ chunk_bytes:CHUNK_BYTES row_slots:ROW_SLOTS map_depth:MAP_DEPTH rx_slots:RX_SLOTS
-  session_ms:SESSION_MS)
-generics_of() {
-  local file=$1 pair
-  shift
-  for pair in "$@"; do
-    sed -nE "s/.*\"${pair%:*}\": *([0-9]+).*/-gG_${pair#*:}=\1/p" "$file"
-  done
-}
-# verilog_of TOP CONFIGURATION NUMBER GENERIC ..: there must be so many generics.
+# verilog_of TOP CONFIGURATION GENERIC ..
 verilog_of() {
-  local top=$1 config=$2 number=$3 dir
-  shift 3
-  if [ $# -ne "$number" ]; then echo "$config: found $# of $number generics"; return 1; fi
+  local top=$1 config=$2 dir
+  shift 2
   dir=$scratch/$top/$(basename "$config" .json)
   if cmake -D GHDL=ghdl -D STANDARD=--std=93 -D TOP="$top" -D "SOURCES=$(IFS='|'; echo "${listed_files[*]}")" \
     -D "GENERICS=$(IFS='|'; echo "$*")" -D "DIR=$dir" -P scripts/cmake/VhdlToVerilog.cmake &&
@@ -126,15 +117,13 @@ verilog_of() {
 check_verilog() {
   command -v ghdl > /dev/null || skip "ghdl is not installed" || return
   command -v verilator > /dev/null || skip "verilator is not installed" || return
-  local config engine bad=0 generics
-  for config in rtl/configs/engine/*.json; do
-    mapfile -t generics < <(generics_of "$config" "${engine_keys[@]}")
-    verilog_of psweep "$config" 14 "${generics[@]}" || bad=1
-  done
-  for config in rtl/configs/chip/*.json; do
-    engine=rtl/configs/engine/$(sed -nE 's/.*"engine": *"([a-z0-9_]+)".*/\1/p' "$config").json
-    mapfile -t generics < <(generics_of "$engine" "${engine_keys[@]}"; generics_of "$config" "${arbiter_keys[@]}")
-    verilog_of psweep_top "$config" 20 "${generics[@]}" || bad=1
+  local config bad=0 generics kind top
+  for kind in engine:psweep chip:psweep_top; do
+    top=${kind#*:}
+    for config in rtl/configs/"${kind%:*}"/*.json; do
+      mapfile -t generics < <(scripts/configurations.py generics --kind "${kind%:*}" "$(basename "$config" .json)")
+      verilog_of "$top" "$config" "${generics[@]/#/-g}" || bad=1
+    done
   done
   return $bad
 }
@@ -162,7 +151,7 @@ check_shell() {
   shellcheck --severity=warning "${scripts[@]}"
 }
 
-checks=(layout text links files analyse vhdl attributes units tables pages evidence arrows trace verilog format shell)
+checks=(layout text links files configurations analyse vhdl attributes units tables pages evidence arrows trace verilog format shell)
 case "${1:-}" in
   -h | --help) sed -n '2,/^[^#]/{/^# SPDX/d;s/^# \{0,1\}//p}' "$0"; exit 0 ;;
   --format)

@@ -67,6 +67,7 @@ for ((k = 1; k <= count; k++)); do
     pick rows "${primes[@]}"
   fi
   pick divider 0 1
+  pick split 0 1
   case $k in
     1) window=21 cols=1 rows=1 planes=1 lanes=1 ;;      # one cell, one plane, the largest window
     2) window=3 cols=1 rows=17 planes=2 lanes=4 ;;      # one column, fewer planes than lanes, the smallest window
@@ -78,12 +79,11 @@ for ((k = 1; k <= count; k++)); do
   if [ "$interp" -gt 8 ]; then interp=8; fi
   name=s${seed}_$k
   args="PLANE_COLS=$cols PLANE_ROWS=$rows PLANES=$planes WINDOW=$window PIX_BITS=$pix WEIGHT_BITS=$weight"
-  args+=" INTERP_FRAC=$interp MNCC_BITS=$mncc FRAC_BITS=$frac LANES=$lanes RECTIFIED=$rectified DIVIDER=$divider"
+  args+=" INTERP_FRAC=$interp MNCC_BITS=$mncc FRAC_BITS=$frac LANES=$lanes RECTIFIED=$rectified DIVIDER=$divider SPLIT=$split"
   args+=" DISPARITY=$disparity"
   if [ -n "$only" ] && [ "$only" -ne "$k" ]; then continue; fi
-  mapfile -t defines < <(tr ' ' '\n' <<< "$args" | sed 's/^/-D/')
-  cmake -D DIR="$out/configs" -D NAME="$name" -D WAVES=1 "${defines[@]}" -P scripts/make_config.cmake \
-    > "$out/$name.log" 2>&1 || { cat "$out/$name.log"; exit 1; }
+  # shellcheck disable=SC2086
+  scripts/configurations.py new --build "$out" NAME="$name" WAVES=1 $args > "$out/$name.log" 2>&1 || { cat "$out/$name.log"; exit 1; }
   names+=("$name")
   wanted+=("$args")
 done

@@ -2,6 +2,7 @@
 # Target helpers shared by all CMakeLists of the project.
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 # OpenCV modules by hand: OpenCVConfig.cmake comes only with Debian's libopencv-dev, ten times the size of the four
 # modules used here.
@@ -72,16 +73,4 @@ function(psweep_test name)
     TEST_PREFIX "${name}: "
     PROPERTIES LABELS "${A_LABELS}" SKIP_REGULAR_EXPRESSION "SKIPPED:"
                FAIL_REGULAR_EXPRESSION "No tests ran|assertions: - none -")
-endfunction()
-
-# Appends G_DIVIDER=.. of an engine's configuration to the list; without the key it is 0.
-function(psweep_divider file json list)
-  string(JSON value ERROR_VARIABLE problem GET "${json}" divider)
-  if(problem)
-    set(value 0)
-  elseif(NOT value MATCHES "^[0-9]+$")
-    message(FATAL_ERROR "${file}: divider is not a number")
-  endif()
-  list(APPEND ${list} G_DIVIDER=${value})
-  set(${list} "${${list}}" PARENT_SCOPE)
 endfunction()

@@ -37,8 +37,9 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parent)]
 
+import configurations  # noqa: E402
 import families  # noqa: E402  (the folder of this script, whatever the current one is)
 import netlist as netlists  # noqa: E402
 
@@ -87,29 +88,14 @@ def generics_of(entity, rtl):
 
 
 def config_generics(entity, config, rtl):
-    """Generics of a named configuration: key 'pix_bits' is generic G_PIX_W."""
-    spelled = {"pix_bits": "G_PIX_W", "weight_bits": "G_WEIGHT_W", "interp_frac": "G_INTERP_F",
-               "mncc_bits": "G_MNCC_W", "frac_bits": "G_FRAC_W"}
+    """Generics of a named configuration that the entity has; of psweep_top: of a chip, else of an engine."""
     known = generics_of(entity, rtl)
-    out = {}
-
-    def take(path):
-        for key, value in json.loads(path.read_text()).items():
-            generic = spelled.get(key, "G_" + key.upper())
-            if generic in known and not isinstance(value, str):
-                out[generic] = int(value)
-
-    if entity == "psweep_top":
-        chip = ROOT / "rtl" / "configs" / "chip" / f"{config}.json"
-        if chip.exists():
-            take(ROOT / "rtl" / "configs" / "engine" / f"{json.loads(chip.read_text())['engine']}.json")
-            take(chip)
-            return out
-    for folder in (ROOT / "rtl" / "configs" / "engine", ROOT / "build" / "configs"):
-        if (folder / f"{config}.json").exists():
-            take(folder / f"{config}.json")
-            return out
-    raise CostError(f"no configuration '{config}' in rtl/configs/engine or build/configs (make config makes one)")
+    kind = "chip" if entity == "psweep_top" and config in configurations.files("chip", ROOT / "build") else "engine"
+    try:
+        found = configurations.find(config, kind)
+    except configurations.ConfigError as error:
+        raise CostError(str(error)) from error
+    return {generic: value for generic, value in found.generics().items() if generic in known}
 
 
 def repair(verilog):

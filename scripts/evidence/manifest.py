@@ -60,7 +60,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("sim-ghdl", ("sim-ghdl",), (*ENGINE, *REPLAY, "tb/replay/record_engine.cpp", "scripts/sim_ghdl.sh"), 6),
     Kind("link-table", ("link-table",), ("sw/forecast/link_*", *PLAN), 2),
     Kind("shape-table", ("shape-table",), ("sw/forecast/shape_table.cpp", *PLAN, "scripts/shape_table.sh"), 1),
-    Kind("sweep", ("sweep",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/sweep.sh", "scripts/make_config.cmake"), 6,
+    Kind("sweep", ("sweep",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/sweep.sh", "scripts/configurations.py"), 6,
          "build/sweep/results.txt"),
     Kind("coverage-lines", ("coverage-lines",),
          (*CHIP, "tb/replay/**",

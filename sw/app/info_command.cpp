@@ -43,30 +43,17 @@ void info_command(const InfoOptions& o) {
 
   ordered_json j;
   j["chip"] = transport->peer();
-  j["capabilities"] = {{"mac", mac_text(chip.mac)},
-                       {"clk_khz", c.clk_khz},
-                       {"img_cols", e.img_cols},
-                       {"img_rows", e.img_rows},
-                       {"plane_cols", e.plane_cols},
-                       {"plane_rows", e.plane_rows},
-                       {"planes", e.planes},
-                       {"window", e.window},
-                       {"pix_bits", e.pix_bits},
-                       {"weight_bits", e.weight_bits},
-                       {"interp_frac", e.interp_frac},
-                       {"mncc_bits", e.mncc_bits},
-                       {"frac_bits", e.frac_bits},
-                       {"lanes", e.lanes},
-                       {"rectified", e.rectified},
-                       {"chunk_bytes", c.chunk_bytes},
-                       {"chunk_pairs", c.chunk_pairs()},
-                       {"row_slots", c.row_slots},
-                       {"cell_bits", c.cell_bits()},
-                       {"cell_bytes", c.cell_bytes()},
-                       {"chunk_cells", c.chunk_cells()},
-                       {"map_depth", c.map_depth},
-                       {"rx_slots", c.rx_slots},
-                       {"session_ms", c.session_ms}};
+  ordered_json& capabilities = j["capabilities"];
+  capabilities["mac"] = mac_text(chip.mac);
+  for (const auto& field : kEngineFields)
+    if (field.info != 0) capabilities[field.key] = e.*field.value;
+  for (const auto& field : kChipFields)
+    if (field.info != 0) capabilities[field.key] = c.*field.value;
+  // What follows from them.
+  capabilities["chunk_pairs"] = c.chunk_pairs();
+  capabilities["cell_bits"] = c.cell_bits();
+  capabilities["cell_bytes"] = c.cell_bytes();
+  capabilities["chunk_cells"] = c.chunk_cells();
   j["state"] = {{"session", session}};
   ordered_json& counters = j["counters"];
   for (int i = 0; i < net::kCounterWords; ++i) {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "contract/fields.hpp"
+
 namespace psweep::golden {
 
 // Positions are sfix(13,19): 32 bits, -4096 .. 4096 px, 19 fraction bits. Steps are ufix(2,19) in a 32-bit word.
@@ -14,22 +16,8 @@ constexpr int kStepBits = 21;
 // loops of column sums and map close in time. Only tiles with width + window - 1 < 8 feel it.
 constexpr int kRowMin = 8;
 
-// Generics of entity psweep: fixed when the hardware is built.
-struct Config {
-  int img_cols = 340;    // G_IMG_COLS   image buffer, columns (even)
-  int img_rows = 144;    // G_IMG_ROWS   image buffer, rows (even)
-  int plane_cols = 256;  // G_PLANE_COLS largest tile, cells
-  int plane_rows = 130;  // G_PLANE_ROWS
-  int planes = 301;      // G_PLANES     largest number of planes (kT), 1 .. 1024
-  int window = 13;       // G_WINDOW     M, odd, 3 .. 21
-  int pix_bits = 8;      // G_PIX_W      pixel bits, 1 .. 12
-  int weight_bits = 8;   // G_WEIGHT_W   fraction bits of a sample position that reach the interpolation, 1 .. 12
-  int interp_frac = 2;   // G_INTERP_F   fraction bits of an interpolated pixel, 0 .. 8
-  int mncc_bits = 13;    // G_MNCC_W     bits of V = ufix(0,mncc_bits), 4 .. 16
-  int frac_bits = 8;     // G_FRAC_W     bits of the depth fraction ufix(0,frac_bits), 2 .. 12
-  int lanes = 1;         // G_LANES      planes swept at once: 1, 2 or 4
-  int rectified = 0;     // G_RECTIFIED  1: smaller build without interpolation between rows
-
+// Generics of entity psweep: fixed when the hardware is built. The members: contract/fields.hpp.
+struct Config : EngineFields {
   int sample_bits() const { return pix_bits + interp_frac; }  // interpolated pixel, ufix(pix_bits, interp_frac)
   int norm_bits() const { return mncc_bits + 3; }             // operands of the MNCC divider
   int plane_bits() const {                                    // plane index in a cell

@@ -28,6 +28,18 @@ inline bool operator==(const Address& a, const Address& b) {
   return a.mac == b.mac && a.ip == b.ip && a.port == b.port;
 }
 
+// Of a chip without straps.
+inline Address address_of(const ChipFields& c) {
+  Address a;
+  for (int i = 0; i < 3; ++i) {
+    a.mac[i] = static_cast<uint8_t>(c.mac_hi >> (16 - 8 * i));
+    a.mac[3 + i] = static_cast<uint8_t>(c.mac_lo >> (16 - 8 * i));
+  }
+  a.ip = static_cast<uint32_t>(c.ip_hi) << 16 | static_cast<uint32_t>(c.ip_lo);
+  a.port = static_cast<uint16_t>(c.udp_port);
+  return a;
+}
+
 // Frame check sequence as a number; it is sent least significant byte first (IEEE 802.3, 3.2.9).
 inline uint32_t crc32(const uint8_t* data, size_t size) {
   uint32_t crc = 0xffffffff;

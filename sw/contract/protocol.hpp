@@ -156,14 +156,8 @@ constexpr const char* kCounterNames[kCounterWords] = {"rx_frames",
                                                       "tiles_failed"};
 
 // Generics of the arbiter; sizes that follow from them and from the engine's.
-struct ArbiterConfig {
+struct ArbiterConfig : ChipFields {
   golden::Config engine;
-  int clk_khz = 166000;
-  int chunk_bytes = 1408;  // G_CHUNK_BYTES, 16 .. 1440: payload of a WRITE or MAP, at most
-  int row_slots = 0;       // G_ROW_SLOTS, 2 .. 1024 chunks; 0: as many as the largest window needs
-  int map_depth = 0;       // G_MAP_DEPTH, cells, rounded up to chunks; 0: the largest tile
-  int rx_slots = 2;        // G_RX_SLOTS, 2 or 4 frames
-  int session_ms = 10000;  // G_SESSION_MS
 
   int pair_bytes() const { return (2 * engine.pix_bits + 7) / 8; }
   int chunk_pairs() const { return chunk_bytes / pair_bytes(); }

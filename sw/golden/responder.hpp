@@ -354,19 +354,16 @@ class Responder {
   }
 
   void append_info(Bytes& out) const {
-    const Config& c = config_.engine;
     uint32_t w[net::kInfoWords] = {};
     auto u = [](auto v) { return static_cast<uint32_t>(v); };
-    w[0] = uint32_t{net::kVersion} << 16 | net::kInfoWords;
-    w[1] = u(c.img_cols), w[2] = u(c.img_rows), w[3] = u(c.plane_cols), w[4] = u(c.plane_rows);
-    w[5] = u(c.planes), w[6] = u(c.window), w[7] = u(c.pix_bits), w[8] = u(c.weight_bits);
-    w[9] = u(c.interp_frac), w[10] = u(c.mncc_bits), w[11] = u(c.frac_bits), w[12] = u(c.lanes);
+    for (const auto& field : kEngineFields) w[field.info] = u(config_.engine.*field.value);
+    for (const auto& field : kChipFields) w[field.info] = u(config_.*field.value);
+    w[0] = uint32_t{net::kVersion} << 16 | net::kInfoWords;  // that was the place of fields without a word
     w[13] = u(config_.cell_bits());
     w[14] = u(mac_ >> 32), w[15] = u(mac_);
-    w[16] = u(config_.clk_khz), w[17] = u(config_.chunk_bytes), w[18] = u(config_.pair_bytes());
-    w[19] = u(config_.chunk_pairs()), w[20] = u(config_.slots()), w[21] = u(config_.cell_bytes());
-    w[22] = u(config_.chunk_cells()), w[23] = u(config_.depth()), w[24] = u(config_.session_ms);
-    w[25] = u(config_.rx_slots), w[26] = net::kCounterWords, w[27] = u(c.rectified);
+    w[18] = u(config_.pair_bytes()), w[19] = u(config_.chunk_pairs()), w[20] = u(config_.slots());
+    w[21] = u(config_.cell_bytes()), w[22] = u(config_.chunk_cells()), w[23] = u(config_.depth());
+    w[26] = net::kCounterWords;
     for (const uint32_t v : w) net::append32(out, v);
   }
 

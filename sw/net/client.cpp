@@ -45,31 +45,19 @@ std::optional<Capabilities> parse_info(const std::vector<uint32_t>& w) {
   Capabilities c;
   golden::Config& e = c.config.engine;
   bool good = true;
-  auto take = [&](int word, uint32_t lo, uint32_t hi) {
-    good = good && w[word] >= lo && w[word] <= hi;
-    return static_cast<int>(std::min(w[word], hi));
+  auto take = [&](const auto& table, auto& values) {
+    for (const auto& field : table) {
+      if (field.info == 0) continue;
+      const uint32_t v = w[field.info];
+      good = good && v <= 0x7fffffff && field.holds(static_cast<int>(v & 0x7fffffff));
+      values.*field.value = static_cast<int>(v & 0x7fffffff);
+    }
   };
-  e.img_cols = take(1, 1, 4096);
-  e.img_rows = take(2, 1, 4096);
-  e.plane_cols = take(3, 1, 4096);
-  e.plane_rows = take(4, 1, 4096);
-  e.planes = take(5, 1, 1024);
-  e.window = take(6, 1, 21);
-  e.pix_bits = take(7, 1, 12);
-  e.weight_bits = take(8, 1, 12);
-  e.interp_frac = take(9, 0, 8);
-  e.mncc_bits = take(10, 4, 16);
-  e.frac_bits = take(11, 2, 12);
-  e.lanes = take(12, 1, 64);
-  e.rectified = take(27, 0, 1);
+  take(kEngineFields, e);
+  take(kChipFields, c.config);
+  if (!good || c.config.row_slots < 2 || c.config.map_depth < 1 || w[26] != kCounterWords) return std::nullopt;
   c.mac = uint64_t{w[14] & 0xffff} << 32 | w[15];
-  c.config.clk_khz = take(16, 1, 10000000);
-  c.config.chunk_bytes = take(17, 16, 1440);
-  c.config.row_slots = take(20, 2, 1024);
-  c.config.map_depth = take(23, 1, 1u << 24);
-  c.config.session_ms = take(24, 1, 65535);
-  c.config.rx_slots = take(25, 1, 4096);
-  c.counters = take(26, kCounterWords, kCounterWords);
+  c.counters = kCounterWords;
   // What follows from the others must follow: chip and host cut rows and cells into the same chunks.
   good =
       good && w[13] == static_cast<uint32_t>(c.config.cell_bits()) &&
@@ -80,13 +68,14 @@ std::optional<Capabilities> parse_info(const std::vector<uint32_t>& w) {
 }
 
 bool same_capabilities(const ArbiterConfig& a, const ArbiterConfig& b) {
-  auto key = [](const ArbiterConfig& c) {
-    const golden::Config& e = c.engine;
-    return std::vector<int>{e.img_cols,  e.img_rows,    e.plane_cols,  e.plane_rows, e.planes,    e.window,
-                            e.pix_bits,  e.weight_bits, e.interp_frac, e.mncc_bits,  e.frac_bits, e.lanes,
-                            e.rectified, c.chunk_bytes, c.row_slots,   c.map_depth};
+  // Sizes and formats; clock and session may differ.
+  auto same = [](const auto& table, const auto& x, const auto& y) {
+    return std::all_of(table.begin(), table.end(), [&](const auto& field) {
+      return field.info == 0 || field.role == Role::build || x.*field.value == y.*field.value;
+    });
   };
-  return key(a) == key(b);
+  return same(kEngineFields, a.engine, b.engine) && same(kChipFields, a, b) && a.engine.lanes == b.engine.lanes &&
+         a.engine.rectified == b.engine.rectified;
 }
 
 std::optional<Status> parse_status(const std::vector<uint32_t>& w) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "verilated/rtl_engine.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <exception>
 #include <mutex>
 #include <sstream>
@@ -12,10 +14,10 @@
 namespace psweep::rtl {
 
 bool serves(const golden::Config& built, const golden::Config& need) {
-  return built.window == need.window && built.pix_bits == need.pix_bits && built.weight_bits == need.weight_bits &&
-         built.interp_frac == need.interp_frac && built.mncc_bits == need.mncc_bits &&
-         built.frac_bits == need.frac_bits && built.img_cols >= need.img_cols && built.img_rows >= need.img_rows &&
-         built.plane_cols >= need.plane_cols && built.plane_rows >= need.plane_rows && built.planes >= need.planes;
+  return std::all_of(kEngineFields.begin(), kEngineFields.end(), [&](const auto& field) {
+    const int has = built.*field.value, wants = need.*field.value;
+    return field.role == Role::size ? has >= wants : field.role != Role::format || has == wants;
+  });
 }
 
 const Configuration* find_configuration(const golden::Config& need) {
@@ -30,13 +32,16 @@ std::string build_command(const golden::Config& need) {
   auto even = [](int v) { return v + (v & 1); };
   std::ostringstream text;
   // The name carries the formats as well: two requests must not replace each other's file.
-  text << "make config NAME=w" << need.window << "_" << need.plane_cols << "x" << need.plane_rows << "_p" << need.planes
-       << "_" << need.pix_bits << "_" << need.weight_bits << "_" << need.interp_frac << "_" << need.mncc_bits << "_"
-       << need.frac_bits << " WINDOW=" << need.window << " PLANE_COLS=" << need.plane_cols
-       << " PLANE_ROWS=" << need.plane_rows << " IMG_COLS=" << even(need.img_cols)
-       << " IMG_ROWS=" << even(need.img_rows) << " PLANES=" << need.planes << " PIX_BITS=" << need.pix_bits
-       << " WEIGHT_BITS=" << need.weight_bits << " INTERP_FRAC=" << need.interp_frac << " MNCC_BITS=" << need.mncc_bits
-       << " FRAC_BITS=" << need.frac_bits;
+  text << "make config NAME=w" << need.window << "_" << need.plane_cols << "x" << need.plane_rows << "_p"
+       << need.planes;
+  for (const auto& field : kEngineFields)
+    if (field.role == Role::format && field.value != &EngineFields::window) text << "_" << need.*field.value;
+  for (const auto& field : kEngineFields) {
+    if (field.role == Role::build) continue;
+    std::string key = field.key;
+    std::transform(key.begin(), key.end(), key.begin(), [](unsigned char c) { return std::toupper(c); });
+    text << " " << key << "=" << (field.multiple == 2 && field.rest == 0 ? even(need.*field.value) : need.*field.value);
+  }
   return text.str();
 }
 

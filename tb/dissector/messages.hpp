@@ -7,6 +7,7 @@
 #pragma once
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <memory>
 #include <random>
 #include <set>
@@ -349,39 +350,28 @@ inline Message status_reply(const net::Header& h, const net::Status& s, const La
 
 inline Message info_reply(const net::Header& h, const net::ArbiterConfig& a, const net::Mac& mac, uint32_t counters,
                           const std::vector<uint32_t>& reserved) {
-  const golden::Config& c = a.engine;
+  std::map<int, std::pair<const char*, int>> words = {{13, {"cell_bits", a.cell_bits()}},
+                                                      {18, {"pair_bytes", a.pair_bytes()}},
+                                                      {19, {"chunk_pairs", a.chunk_pairs()}},
+                                                      {21, {"cell_bytes", a.cell_bytes()}},
+                                                      {22, {"chunk_cells", a.chunk_cells()}}};
+  for (const auto& field : kEngineFields) words[field.info] = {field.key, a.engine.*field.value};
+  for (const auto& field : kChipFields) words[field.info] = {field.key, a.*field.value};
+  words.erase(0);  // fields without a word
   Message m("INFO reply", false, h);
   m.box("info");
   m.u16("info.version", net::kVersion);
   m.u16("info.words", net::kInfoWords);
-  auto word = [&](const char* name, int v) { m.u32(std::string("info.") + name, static_cast<uint32_t>(v)); };
-  word("img_cols", c.img_cols);
-  word("img_rows", c.img_rows);
-  word("plane_cols", c.plane_cols);
-  word("plane_rows", c.plane_rows);
-  word("planes", c.planes);
-  word("window", c.window);
-  word("pix_bits", c.pix_bits);
-  word("weight_bits", c.weight_bits);
-  word("interp_frac", c.interp_frac);
-  word("mncc_bits", c.mncc_bits);
-  word("frac_bits", c.frac_bits);
-  word("lanes", c.lanes);
-  word("cell_bits", a.cell_bits());
-  m.u16("info.mac_zero", 0);
-  m.raw("info.mac", Bytes(mac.begin(), mac.end()));
-  word("clk_khz", a.clk_khz);
-  word("chunk_bytes", a.chunk_bytes);
-  word("pair_bytes", a.pair_bytes());
-  word("chunk_pairs", a.chunk_pairs());
-  word("row_slots", a.row_slots);
-  word("cell_bytes", a.cell_bytes());
-  word("chunk_cells", a.chunk_cells());
-  word("map_depth", a.map_depth);
-  word("session_ms", a.session_ms);
-  word("rx_slots", a.rx_slots);
-  m.u32("info.counters", counters);
-  word("rectified", c.rectified);
+  for (int i = 1; i <= 27; ++i) {
+    if (i == 14) {
+      m.u16("info.mac_zero", 0);
+      m.raw("info.mac", Bytes(mac.begin(), mac.end()));
+    } else if (i == 26) {
+      m.u32("info.counters", counters);
+    } else if (i != 15) {
+      m.u32(std::string("info.") + words.at(i).first, static_cast<uint32_t>(words.at(i).second));
+    }
+  }
   for (const uint32_t w : reserved) m.u32("info.reserved", w);
   return m;
 }

@@ -114,7 +114,7 @@ TEST_CASE("link plan: the buffers' block RAMs are those that Yosys takes") {
   net::ArbiterConfig c = with_buffers(board(true), 9, 0);
   c.engine.pix_bits = 12;
   CHECK(buffer_ram(c).rows == 3.5);
-  c = net::ArbiterConfig{{62, 38, 37, 23, 19, 7, 8, 6, 4, 11, 5, 1}, 60000, 502, 5, 300, 4, 50};
+  c = net::ArbiterConfig{{60000, 502, 5, 300, 4, 50}, {{62, 38, 37, 23, 19, 7, 8, 6, 4, 11, 5, 1}}};
   CHECK(buffer_ram(c).map == 0.5);
 }
 
