@@ -88,6 +88,7 @@ class Bench : public Agent {
     dut.b_index = static_cast<SData>(chance(0.9) ? draw(shape_.slots) : random_() & 0x3ff);
     dut.fail = chance(rates_.fail);
     if (dut.fail && gone_) {
+      check_at_once();
       late_ = writing_;
       writing_ = false;
       wait_ = 0;
@@ -95,6 +96,7 @@ class Bench : public Agent {
     }
     if (chance(rates_.clear)) {
       dut.clear = 1;
+      check_at_once();
       late_ = writing_;
       writing_ = false;
       wait_ = 0;
@@ -186,6 +188,14 @@ class Bench : public Agent {
   bool chance(double p) { return std::bernoulli_distribution(p)(random_); }
 
   uint32_t draw(int n) { return static_cast<uint32_t>(random_() % static_cast<unsigned>(n)); }
+
+  // A check in the clock in which the tile is forgotten.
+  void check_at_once() {
+    if (writing_ || wait_ > 0 || !chance(0.5)) return;
+    chunk_ = model.base() + static_cast<int>(draw(shape_.slots));
+    dut.w_check = 1;
+    dut.w_chunk = static_cast<SData>(chunk_);
+  }
 
   void drive_writer() {
     if (writing_) {
