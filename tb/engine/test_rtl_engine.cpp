@@ -282,6 +282,6 @@ TEST_CASE("rtl engine: the smallest configuration that serves is chosen, and the
     CHECK(rtl::find_configuration(other) == nullptr);
   }
   need.window = 9, need.img_cols = 101;
-  CHECK_THAT(rtl::build_command(need), contains("make config NAME=w9_256x130_p301_8_8_2_13_8 "
-                                                "WINDOW=9 PLANE_COLS=256 PLANE_ROWS=130 IMG_COLS=102"));
+  CHECK_THAT(rtl::build_command(need), contains("make config NAME=w9_256x130_p301_8_8_2_13_8 IMG_COLS=102 IMG_ROWS=144 "
+                                                "PLANE_COLS=256 PLANE_ROWS=130 PLANES=301 WINDOW=9 PIX_BITS=8"));
 }
