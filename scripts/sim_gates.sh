@@ -41,7 +41,7 @@ cells=$(dirname "$(dirname "$(readlink -f "$(command -v yosys)")")")/share/yosys
 counted_cells=''
 case " ${names[*]} " in
   *:counted\ *)
-    scripts/cost/venv.sh --check || exit 2
+    scripts/setup.sh --check cost || exit 2
     counted_cells=$(echo "${COST_VENV:-build/cost/venv}"/lib/python3*/site-packages/pyosys/share/xilinx/cells_sim.v)
     [ -f "$counted_cells" ] || { echo "sim_gates.sh: Yosys' cell models are not at $counted_cells" >&2; exit 2; }
     ;;
@@ -72,7 +72,7 @@ gates() { # one configuration
   grep clocks "$dir/record.log"
   echo "Yosys at work"
   if [ "$1" != "$name" ]; then
-    models=$counted_cells open=(-dbg_)
+    models=$counted_cells open=(--open dbg_)
     scripts/cost/measure.py --config "$name" --netlist "$dir/raw.v" || return 1
   else
     synthesise || return 1
@@ -85,7 +85,7 @@ gates() { # one configuration
   # A register of the DSP that is left out is a copy of its input; Icarus would see no change of a constant input.
   perl -0pe 's/^module RAMB(?:18|36)E1\b.*?^endmodule\n//msg;
     s/always \@\* (\w+)\s*<?= (\w+);/always begin $1 = $2; \@($2); end/g' "$models" > "$dir/cells.v"
-  perl tb/replay/ports.pl gates "$verilog" psweep rtl/psweep.vhd tb/gates/replay.v.in clk "${open[@]}" > "$dir/bench.v"
+  scripts/tools.py ports --out "$dir/bench.v" gates "$verilog" psweep psweep tb/gates/replay.v.in clk "${open[@]}"
   compile "$dir/gates.vvp" "$dir/netlist.v" "$dir" || return 1
   replay "$dir/gates.vvp" "$dir/recording.txt" || { echo "FAILED: the netlist differs"; return 1; }
   echo "the netlist is bit-exact ($((SECONDS - begun)) s)"

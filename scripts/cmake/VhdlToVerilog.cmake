@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> [-D BOTH_EDGES=ON]
-#       [-D EDIT=<Perl or Python script> -D NOTES=<its third file>] -P VhdlToVerilog.cmake
+#       [-D UPSETS=option|.. -D SITES=<file> -D PYTHON=] -P VhdlToVerilog.cmake
+# UPSETS: registers that can be upset, by scripts/tools.py upsets, which lists them in SITES.
 # Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
 # What stands between translate_off and translate_on behind a comment '-- collision:' is translated all the same: a
 # word that a RAM reads while it is written is random in the models, as it is 'X' in the VHDL, not the old one of the
@@ -30,15 +31,10 @@ edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\
                ${SOURCES})
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${models})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
-if(EDIT)
-  set(interpreter perl)
-  if(EDIT MATCHES "\\.py$")
-    set(interpreter python3)
-  endif()
-  execute_process(COMMAND ${interpreter} ${EDIT} ${DIR}/raw.v ${DIR}/edited.v ${NOTES} RESULT_VARIABLE code)
-  if(NOT code EQUAL 0)
-    message(FATAL_ERROR "${EDIT} failed")
-  endif()
+if(UPSETS)
+  string(REPLACE "|" ";" UPSETS "${UPSETS}")
+  execute_process(COMMAND ${PYTHON} -B ${CMAKE_CURRENT_LIST_DIR}/../tools.py upsets ${DIR}/raw.v ${DIR}/edited.v
+                          ${SITES} ${TOP} ${UPSETS} COMMAND_ERROR_IS_FATAL ANY)
   file(RENAME ${DIR}/edited.v ${DIR}/raw.v)
 endif()
 if(BOTH_EDGES)

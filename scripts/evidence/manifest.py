@@ -15,7 +15,8 @@ CHIP = ("@chip", *BUILD, *MODEL, *BUILT, "rtl/configs/chip/**", "sw/desk/**", "s
         "!tb/chip/test_*", "!tb/chip/link_speed.cpp")
 ENGINE = ("@engine", *BUILD, *MODEL, *BUILT, "tb/engine/engine_bench.hpp", "tb/engine/configurations.hpp",
           "sw/scene/stimulus.hpp")
-REPLAY = ("tb/replay/**", "!tb/replay/record_*")
+REPLAY = ("tb/replay/**", "scripts/psweep_tools/replay/**", "!tb/replay/record_*")
+UPSETS = "scripts/psweep_tools/upsets/**"
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,9 @@ KINDS: tuple[Kind, ...] = (
           "scripts/mutants_equivalent.txt"),
          60, "build/evidence/mutants.json", speaks_for_itself=True, takes_a_copy=True,
          goes_on="mutant by mutant, also after edits: build/mutants/results.jsonl"),
-    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/upsets/**", "scripts/flips_chip.py"), 15, "build/flips_chip.txt"),
-    Kind("flips", ("flips",), (*ENGINE, "tb/upsets/flips.cpp", "tb/upsets/inject.pl", "scripts/flips.sh"), 2,
+    Kind("flips-chip", ("flips-chip",), (*CHIP, "tb/upsets/**", UPSETS, "scripts/flips_chip.py"), 15,
+         "build/flips_chip.txt"),
+    Kind("flips", ("flips",), (*ENGINE, "tb/upsets/flips.cpp", UPSETS, "scripts/flips.sh"), 2,
          "build/flips.txt"),
     Kind("soak", ("soak",), (*ENGINE, *REPLAY, "tb/soak/**", "scripts/soak.sh"), 4),
     Kind("formal", ("formal",),

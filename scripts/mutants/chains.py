@@ -35,7 +35,7 @@ def unit(name: str) -> Test:
 def _soak(config: str) -> Test:
     return Test(f"soak of {config}", f"engine_{config}", ("soak",), ("tb/soak/soak", "-a"), True, False,
                 ("tb/soak/soak.cpp",), "psweep", (("PSWEEP_CONFIG", config), ("PSWEEP_TILES", "150")),
-                (f"rtl/configs/engine/{config}.json", "tb/replay/engine.cpp.in", "tb/replay/ports.pl"))
+                (f"rtl/configs/engine/{config}.json", "tb/replay/engine.cpp.in", "scripts/psweep_tools/replay/"))
 
 
 def _ctest(name: str, pattern: str, targets: tuple[str, ...], starts: tuple[str, ...], top: str) -> Test:
