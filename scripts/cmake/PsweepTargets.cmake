@@ -62,7 +62,7 @@ endfunction()
 
 # psweep_test(<name> SOURCES .. LIBS ..): Catch2 test program with its own main from Catch2, one ctest entry per case.
 # A case that asserts nothing fails, and so does a name that matches no case. A case whose data is absent prints
-# 'SKIPPED: <reason>' and then calls SUCCEED(): it is counted as skipped (scripts/summary.sh).
+# 'SKIPPED: <reason>' and then calls SUCCEED(): it is counted as skipped (scripts/tools.py sim).
 function(psweep_test name)
   cmake_parse_arguments(A "" "" "SOURCES;LIBS;DEFINITIONS;LABELS" ${ARGN})
   psweep_program(${name} SOURCES ${A_SOURCES} LIBS ${A_LIBS} psweep_catch)

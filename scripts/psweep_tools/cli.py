@@ -11,11 +11,31 @@ from .work import Failure
 
 # Name: module in this package whose main(arguments) does it, what it does.
 COMMANDS = {
-    "setup": ("setup", "installs Debian's packages and virtual environments"),
+    "ci": ("ci", "what continuous integration runs"),
+    "coverage": ("coverage.main", "lines and bits that the tests reach"),
+    "demo": ("demo", "one scene through float, fixed and RTL, with a report"),
+    "dse": ("dse.explore", "the design space, by Snakemake"),
+    "dse-node": ("dse.node", "a command in a Slurm cluster of this machine"),
+    "dse-trial": ("dse.trial", "does the workflow of the design space resume?"),
+    "formal": ("formal", "proofs, and faults that have to be found"),
+    "fresh-machine": ("flows.machine", "README's commands in a bare Debian"),
     "generics": ("generics", "generics just outside of their ranges are refused"),
     "lint": ("lint.main", "quick checks of everything that is text"),
-    "upsets": ("upsets.inject", "circuits whose registers can be upset"),
+    "mac-opinion": ("flows.opinion", "the MAC against cocotbext-eth"),
     "ports": ("replay.ports", "benches and recorders, written from the ports of an entity"),
+    "real": ("real", "real pairs, tabled"),
+    "rules": ("replay.rules", "do the assertions in the VHDL find what they are for?"),
+    "same-output": ("pairs", "two folders with results, byte by byte"),
+    "setup": ("setup", "installs Debian's packages and virtual environments"),
+    "shapes": ("shapes", "tables and picture of tiles of every shape"),
+    "sim": ("sim", "runs the tests, sums them up"),
+    "sim-gates": ("flows.gates", "the netlist at gate level"),
+    "sim-ghdl": ("replay.more", "more recordings on the original VHDL"),
+    "sim-net": ("flows.network", "the simulated chip behind the kernel's network stack"),
+    "soak": ("soak", "random tiles, good and bad"),
+    "sweep": ("sweep", "engines of random sizes and formats"),
+    "upsets": ("upsets.inject", "circuits whose registers can be upset"),
+    "wave-pictures": ("flows.waves", "pictures of waves, by GTKWave"),
 }
 
 
