@@ -2,7 +2,7 @@
 # VHDL entity + generics -> Verilated C++ library.
 #
 #   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [EDIT <script>])
-#     Static library <name> with header V<name>.h (class V<name>) for entity rtl/<entity>.vhd. TRACE: the model can
+#     Static library <name> with header V<name>.h (class V<name>) for an entity of rtl/files.f. TRACE: the model can
 #     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
 #     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).
 #     UPSETS: registers can be upset: options of `scripts/tools.py upsets`, which writes <name>.inc as well.
@@ -100,6 +100,13 @@ function(psweep_rtl_sources entity out)
     endif()
   endforeach()
   message(FATAL_ERROR "rtl/files.f has no file ${entity}.vhd")
+endfunction()
+
+# The file of an entity, by rtl/files.f.
+function(psweep_rtl_file entity out)
+  psweep_rtl_sources(${entity} sources)
+  list(GET sources -1 file)
+  set(${out} ${file} PARENT_SCOPE)
 endfunction()
 
 function(rtl_model name)

@@ -5,6 +5,7 @@ import re
 
 from evidence import sources
 from mutants import faults
+from psweep_tools import vhdl
 
 
 def gone(root: pathlib.Path = sources.ROOT) -> list[str]:
@@ -12,15 +13,15 @@ def gone(root: pathlib.Path = sources.ROOT) -> list[str]:
 
 
 def _lines(root: pathlib.Path, entity: str) -> list[str]:
-    path = root / "rtl" / f"{entity}.vhd"
-    return path.read_bytes().decode("latin-1").split("\n") if path.is_file() else []
+    rtl = vhdl.Rtl(root / "rtl")
+    return rtl.text(entity).split("\n") if entity in rtl.files else []
 
 
 def _holes(root: pathlib.Path) -> list[str]:
     out, entity, there = [], "", {}
     name = "scripts/coverage_holes.txt"
     for n, line in enumerate((root / name).read_text().splitlines(), 1):
-        if m := re.fullmatch(r"rtl/(\w+)\.vhd", line):
+        if m := re.fullmatch(r"rtl/(?:\w+/)*(\w+)\.vhd", line):
             entity, there = m[1], {}
             for text in _lines(root, entity):
                 there[faults.trimmed(text)] = there.get(faults.trimmed(text), 0) + 1
@@ -28,7 +29,7 @@ def _holes(root: pathlib.Path) -> list[str]:
             text = faults.trimmed(m[1])
             there[text] = there.get(text, 0) - 1
             if there[text] < 0:
-                out.append(f"{name}:{n}: rtl/{entity}.vhd has no such line (any more): {text}")
+                out.append(f"{name}:{n}: {entity}.vhd has no such line (any more): {text}")
     return out
 
 
@@ -37,5 +38,5 @@ def _equivalents(root: pathlib.Path) -> list[str]:
     for key, entry in faults.equivalents(root / "scripts" / "mutants_equivalent.txt").items():
         entity = key.split("|")[0]
         if not any(m.key == key for m in faults.candidates(entity, _lines(root, entity), 1)):
-            out.append(f"scripts/{entry.where}: fits no line of rtl/{entity}.vhd (any more)")
+            out.append(f"scripts/{entry.where}: fits no line of {entity}.vhd (any more)")
     return out

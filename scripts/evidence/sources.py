@@ -6,16 +6,10 @@ import re
 import subprocess
 from collections.abc import Callable, Iterable
 
+from psweep_tools import vhdl
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# A comment of VHDL that tools read is no comment.
-_VHDL = re.compile(r'"[^"\n]*"|--[^\n]*')
-_PRAGMA = re.compile(r"--\s*(synthesis|pragma|synopsys)\s+translate_(on|off)")
 _CPP = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'|//[^\n]*|/\*.*?\*/', re.S)
-
-
-def _vhdl(match: re.Match[str]) -> str:
-    text = match[0]
-    return text if text[0] == '"' or _PRAGMA.match(text) else ""
 
 
 def _cpp(match: re.Match[str]) -> str:
@@ -25,8 +19,8 @@ def _cpp(match: re.Match[str]) -> str:
 def essence(name: str, content: bytes) -> bytes:
     """The text without comments, trailing blanks and blank lines, of VHDL and C++; anything else as it is."""
     if name.endswith(".vhd"):
-        text = _VHDL.sub(_vhdl, content.decode("latin-1"))
-    elif name.endswith((".cpp", ".hpp", ".inc", ".cpp.in")):
+        return vhdl.essence(content.decode("latin-1")).encode("latin-1")
+    if name.endswith((".cpp", ".hpp", ".inc", ".cpp.in")):
         text = _CPP.sub(_cpp, content.decode("latin-1"))
     else:
         return content
@@ -65,19 +59,20 @@ def matches(pattern: str, name: str) -> bool:
 
 def entities(files_f: str) -> list[str]:
     """Entities (and packages) of rtl/files.f, in its order."""
-    return re.findall(r"^(\w+)\.vhd", files_f, re.M)
+    return list(vhdl.listed(files_f))
 
 
 def expand(globs: Iterable[str], names: Iterable[str], files_f: str) -> list[str]:
     """Files of `names` that the globs name. '@engine': the RTL up to psweep; '@chip': all RTL; '!' in front of a glob
     takes its files out again."""
-    order = entities(files_f)
+    files = vhdl.listed(files_f)
+    order = list(files)
     rtl = {"@engine": order[:order.index("psweep") + 1] if "psweep" in order else order, "@chip": order}
     all_names = list(names)
     wanted: set[str] = set()
     for glob in globs:
         if glob in rtl:
-            wanted |= {f"rtl/{entity}.vhd" for entity in rtl[glob]} & set(all_names)
+            wanted |= {f"rtl/{files[entity]}" for entity in rtl[glob]} & set(all_names)
         elif glob.startswith("!"):
             wanted = {name for name in wanted if not matches(glob[1:], name)}
         else:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from evidence import sources
+from psweep_tools import vhdl
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,8 @@ class Chains:
         self._names, self._set = names, set(names)
         self._texts: dict[str, str] = {}
         self._read = read
-        self.order = sources.entities(self.text("rtl/files.f"))
+        self.files = vhdl.listed(self.text("rtl/files.f"))
+        self.order = list(self.files)
         others = sorted(m[1] for n in names if (m := re.fullmatch(r"tb/chip/(test_\w+)\.cpp", n)))
         chip = (*_CHIP_FIRST, *(_program("chip", n, "psweep_top") for n in others if n not in _NOT_OF_THE_CHIP),
                 *_CHIP_LAST)
@@ -107,15 +109,17 @@ class Chains:
         return self._texts[name]
 
     def _rtl(self, entity: str) -> str:
-        return self.text(f"rtl/{entity}.vhd")
+        return self.text(f"rtl/{self.files[entity]}")
 
     def depends(self, test: Test) -> str:
         """Hash of the RTL and the sources of a test."""
         if test.name not in self._hashes:
-            files = [f"rtl/{name}.vhd" for name in sources.rtl_closure(test.top, self.order, self._rtl)]
-            files += sources.include_closure(test.starts, self._set.__contains__, self.text)
+            # By name alone: a file of the RTL that is moved is the same.
+            rtl = sources.rtl_closure(test.top, self.order, self._rtl)
+            parts = [f"rtl/{n}.vhd {sources.digest('a.vhd', self._rtl(n).encode('latin-1'))}" for n in sorted(rtl)]
+            files = sources.include_closure(test.starts, self._set.__contains__, self.text)
             files += [n for n in self._names if n.startswith(tuple(test.files)) and test.files]
-            parts = [f"{n} {sources.digest(n, self.text(n).encode('latin-1'))}" for n in sorted(set(files))]
+            parts += [f"{n} {sources.digest(n, self.text(n).encode('latin-1'))}" for n in sorted(set(files))]
             parts.append(repr((test.targets, test.command, test.environment)))
             if not test.whole:  # the generics of its models
                 parts += [line for line in self.text("tb/units/CMakeLists.txt").splitlines() if test.top in line]

@@ -47,7 +47,7 @@ class Mutant:
         return f"{self.entity}|{self.nth}|{trimmed(self.before)}|{trimmed(self.after)}"
 
     def shown(self) -> str:
-        return f"rtl/{self.entity}.vhd:{self.line + 1}  {trimmed(self.before)}  ->  {trimmed(self.after)}"
+        return f"{self.entity}.vhd:{self.line + 1}  {trimmed(self.before)}  ->  {trimmed(self.after)}"
 
 
 @dataclass
@@ -210,7 +210,7 @@ def equivalents(path: pathlib.Path) -> dict[str, Equivalent]:
     for n, line in enumerate(path.read_text().splitlines() if path.exists() else [], 1):
         if line.startswith("#") or not line.strip():
             continue
-        if m := re.fullmatch(r"rtl/(\w+)\.vhd(?: #(\d+))?", line):
+        if m := re.fullmatch(r"rtl/(?:\w+/)*(\w+)\.vhd(?: #(\d+))?", line):
             place, before, entry = f"{m[1]}|{int(m[2] or 1) - 1}", None, None
         elif line.startswith("- ") and place:
             before = trimmed(line[2:])

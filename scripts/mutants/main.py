@@ -15,6 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from mutants import campaign as c  # noqa: E402
 from mutants import faults, workshop  # noqa: E402
 from mutants.chains import Chains  # noqa: E402
+from psweep_tools.vhdl import Rtl  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LIST = ROOT / "scripts" / "mutants_equivalent.txt"
@@ -49,14 +50,14 @@ def drawn(tree: pathlib.Path, chains: Chains, options: argparse.Namespace) -> li
         if not only:
             raise ValueError("--only wants ENTITY.NUMBER")
         wanted = [only[1]]
-    found = []
+    found, rtl = [], Rtl(tree / "rtl")
     for name in wanted:
         if name not in chains.of:
             raise ValueError(f"no entity {name} in rtl/files.f")
-        text = (tree / "rtl" / f"{name}.vhd").read_bytes().decode("latin-1").split("\n")
+        text = rtl.text(name).split("\n")
         ordered = faults.drawn_order(faults.candidates(name, text, options.seed))
         if not ordered:
-            raise ValueError(f"rtl/{name}.vhd: no place for a fault")
+            raise ValueError(f"rtl/{rtl.name(name)}: no place for a fault")
         quota = min(options.count or faults.quota(len(text) - 1), len(ordered))
         if only:
             ordered, quota = [m for m in ordered if m.id == options.only], 1
@@ -184,11 +185,10 @@ def main(arguments: list[str]) -> int:
 
 def _fits(key: str, tree: pathlib.Path, seed: int) -> bool:
     """Is there such a mutant?"""
-    path = tree / "rtl" / f"{key.split('|')[0]}.vhd"
-    if not path.is_file():
+    rtl, entity = Rtl(tree / "rtl"), key.split("|")[0]
+    if entity not in rtl.files:
         return False
-    text = path.read_bytes().decode("latin-1").split("\n")
-    return any(m.key == key for m in faults.candidates(path.stem, text, seed))
+    return any(m.key == key for m in faults.candidates(entity, rtl.text(entity).split("\n"), seed))
 
 
 if __name__ == "__main__":

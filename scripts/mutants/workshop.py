@@ -12,6 +12,7 @@ import threading
 import time
 
 from mutants.chains import Test
+from psweep_tools.vhdl import Rtl
 
 FOLDERS = ("CMakeLists.txt", "rtl", "sw", "tb", "scripts")
 # Large and slow; no test used here needs them.
@@ -99,7 +100,7 @@ class Job:
 
     def put(self, entity: str, text: str) -> None:
         """Replaces the VHDL of an entity in the copy."""
-        (self.tree / "rtl" / f"{entity}.vhd").write_bytes(text.encode("latin-1"))
+        Rtl(self.tree / "rtl").path(entity).write_bytes(text.encode("latin-1"))
 
     def configure(self, name: str) -> pathlib.Path:
         """The build folder, configured once."""

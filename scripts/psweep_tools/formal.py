@@ -121,9 +121,9 @@ class Prover:
         try:
             (folder / "raw.v").write_text(work.output(
                 ["ghdl", "--synth", "--std=93", "--no-formal", f"--workdir={folder}", "--out=verilog", *generics,
-                 proof.top], environment={}))
+                 proof.top], notes=log))
         except Failure:
-            return f"GHDL failed: --synth in {folder}"
+            return f"GHDL failed: {log}"
         return self.check_crossings(folder) if proof.crossings else self.prove(proof, folder)
 
     def check_crossings(self, folder: pathlib.Path) -> str:

@@ -66,12 +66,14 @@ def _call(command: list[str], env: dict[str, str], cwd: pathlib.Path, out: int |
 
 
 def output(command: Sequence[str | pathlib.Path], *, environment: Mapping[str, str] | None = None,
-           cwd: pathlib.Path = ROOT) -> str:
-    """What a command that succeeds prints."""
+           cwd: pathlib.Path = ROOT, notes: pathlib.Path | None = None) -> str:
+    """What a command that succeeds prints; what it has to say goes to the file `notes`, if there is one."""
     done = subprocess.run([str(part) for part in command], env={**os.environ, **(environment or {})}, cwd=cwd,
-                          stdout=subprocess.PIPE, text=True, check=False)
+                          text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE if notes else None, check=False)
+    if notes:
+        notes.write_text(done.stderr)
     if done.returncode:
-        raise Failure(f"{command[0]} ended with {done.returncode}\n{done.stdout[-2000:]}")
+        raise Failure(f"{command[0]} ended with {done.returncode}\n{((done.stderr or '') + done.stdout)[-2000:]}")
     return done.stdout
 
 

@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> int:
     work.run(["ghdl", "-a", "--std=93", f"--workdir={folder}", *Rtl().sources("mac_tx")])
     for unit in ("mac_rx", "mac_tx"):
         (out / f"{unit}.v").write_text(work.output(["ghdl", "--synth", "--std=93", f"--workdir={folder}",
-                                                    "--out=verilog", unit]))
+                                                    "--out=verilog", unit], notes=out / f"{unit}.log"))
     work.run(["iverilog", "-g2012", "-s", "mac_wrapper", "-o", out / "mac.vvp", "tb/flows/mac_wrapper.v",
               out / "mac_rx.v", out / "mac_tx.v"])
 
