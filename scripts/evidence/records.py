@@ -104,7 +104,8 @@ def stamp_of(files: dict[str, str], commit: str = "HEAD") -> Stamp:
     short, subject, date = said.decode().strip().split("\0")
     if commit != "HEAD":
         return Stamp(short, subject, date, sources.combined(files), files)
-    changed = sources.git("status", "--porcelain", "--", *files) if files else b""
+    places = [re.sub(r"^rtl/(\w+\.vhd)$", r":(glob)rtl/**/\1", name) for name in files]
+    changed = sources.git("status", "--porcelain", "--", *places) if files else b""
     return Stamp(short, subject, str(datetime.date.today()), sources.combined(files), files,
                  edited=bool((changed or b"").strip()), machine=machine())
 

@@ -28,6 +28,11 @@ def essence(name: str, content: bytes) -> bytes:
     return "\n".join(line for line in lines if line).encode("latin-1")
 
 
+def known_as(name: str) -> str:
+    """A name in a stamp: of VHDL without the folder in rtl/, as a file that is moved is the same."""
+    return re.sub(r"^rtl/(?:\w+/)+(\w+\.vhd)$", r"rtl/\1", name)
+
+
 def digest(name: str, content: bytes) -> str:
     return hashlib.sha256(essence(name, content)).hexdigest()[:12]
 
@@ -112,7 +117,7 @@ class Tree:
         for name in expand(globs, self.names, files_f):
             if name not in self._hashes:
                 self._hashes[name] = digest(name, self.read(name))
-            out[name] = self._hashes[name]
+            out[known_as(name)] = self._hashes[name]
         return out
 
 

@@ -13,7 +13,7 @@ for waves and would take hundreds of pads: they stay open.
   other tops     for estimates: their clocks, and for each clock one input, through a shift register to all inputs of
                  this clock, and one output, an exclusive-or of registers of all outputs (as scripts/cost/pnr.py). So
                  nothing is optimised away and no pad limits the clock; the tables count u_<top> alone
-Runs in Python 3.9 and later: the tools bring their own.
+Runs in Python 3.8 and later: the tools bring their own.
 """
 import json
 import pathlib

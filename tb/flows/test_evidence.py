@@ -35,6 +35,10 @@ class Hashes(unittest.TestCase):
         self.assertEqual(sources.expand(["tb/x/**", "!tb/x/test_*"], names, files_f), ["tb/x/t.cpp", "tb/x/y/u.cpp"])
         self.assertEqual(sources.expand(["tb/x/*.cpp"], names, files_f), ["tb/x/t.cpp", "tb/x/test_v.cpp"])
 
+    def test_moved_vhdl_is_the_same(self) -> None:
+        self.assertEqual([sources.known_as(n) for n in ("rtl/x/a.vhd", "rtl/a.vhd", "rtl/configs/engine/tiny.json")],
+                         ["rtl/a.vhd", "rtl/a.vhd", "rtl/configs/engine/tiny.json"])
+
     def test_closures(self) -> None:
         text = {"p": "package p", "a": "use work.p.all; -- b", "b": "u : entity work.a"}.__getitem__
         self.assertEqual(sources.rtl_closure("b", ["p", "a", "b"], text), ["p", "a", "b"])
