@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import json
 import os
 import pathlib
 import tempfile
@@ -75,12 +76,12 @@ class Coverage(unittest.TestCase):
         rtl = Rtl()
         text = rtl.text("ram_sdp").split("\n")
         line = next(n for n, t in enumerate(text, 1) if "<=" in t and not t.strip().startswith("--"))
-        holes = f"rtl/ram_sdp.vhd\n- {text[line - 1].strip()}\n  a reason\n"
+        holes = f"rtl/{rtl.name('ram_sdp')}\n- {text[line - 1].strip()}\n  a reason\n"
         with folder() as at:
             for result, list_of_holes, code in (
                     ({str(line): 1}, "", 0), ({str(line): 0}, "", 1), ({str(line): 1}, holes, 1)):
                 (at / "c.json").write_text(
-                    '{"outputs": [{"file": "rtl/ram_sdp.vhd", "result": ' + str(result).replace("'", '"') + "}]}")
+                    json.dumps({"outputs": [{"file": f"rtl/{rtl.name('ram_sdp')}", "result": result}]}))
                 self.assertEqual(report.report_lines(at, [at / "c.json"], rtl, list_of_holes), code)
             (at / "c.json").write_text('{"outputs": []}')
             with self.assertRaises(Failure):
