@@ -146,7 +146,7 @@ real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: b
 	@scripts/real.sh '$(DATA)'
 
 .PHONY: config
-config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=256 ...: keys of rtl/configs/engine.schema.json
+config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 ..: keys of rtl/configs/engine.schema.json
 	@scripts/configurations.py new $(filter-out JOBS=% VERBOSE=% SETUP=%,$(MAKEOVERRIDES))
 	@scripts/build.sh psweep
 

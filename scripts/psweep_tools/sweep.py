@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import sys
 
 from . import soak, work
 from .paths import ROOT
@@ -49,7 +50,7 @@ DEGENERATE: dict[int, dict[str, int]] = {
     4: {"PIX_BITS": 1, "WEIGHT_BITS": 1, "INTERP_FRAC": 0, "MNCC_BITS": 4, "FRAC_BITS": 2, "PLANE_ROWS": 5},
 }
 ORDER = ("PLANE_COLS", "PLANE_ROWS", "PLANES", "WINDOW", "PIX_BITS", "WEIGHT_BITS", "INTERP_FRAC", "MNCC_BITS",
-         "FRAC_BITS", "LANES", "RECTIFIED", "DIVIDER", "DISPARITY")
+         "FRAC_BITS", "LANES", "RECTIFIED", "DIVIDER", "SPLIT", "DISPARITY")
 
 
 def drawn(seed: int, count: int) -> list[dict[str, int]]:
@@ -64,6 +65,7 @@ def drawn(seed: int, count: int) -> list[dict[str, int]]:
         if random.pick(0, 1):
             c["PLANE_COLS"], c["PLANE_ROWS"] = random.pick(*PRIMES), random.pick(*PRIMES)
         c["DIVIDER"] = random.pick(0, 1)
+        c["SPLIT"] = random.pick(0, 1)
         c.update(DEGENERATE.get(k, {}))
         # The bench's ports are words of 64 bits: samples of four lanes in one.
         if c["LANES"] * (c["PIX_BITS"] + c["INTERP_FRAC"]) > 64:
@@ -91,8 +93,8 @@ def main(arguments: list[str]) -> int:
     if not wanted:
         raise Failure(f"no configuration {given.only} among {given.count}")
     for k, config in wanted.items():
-        work.run(["cmake", "-D", f"DIR={configs}", "-D", f"NAME=s{given.seed}_{k}", "-D", "WAVES=1",
-                  *(f"-D{key}={value}" for key, value in config.items()), "-P", "scripts/make_config.cmake"],
+        work.run([sys.executable, "-B", "scripts/configurations.py", "new", "--build", out, f"NAME=s{given.seed}_{k}",
+                  "WAVES=1", *(f"{key}={value}" for key, value in config.items())],
                  log=out / f"s{given.seed}_{k}.log")
     print(f"sweep: seed {given.seed}, building {len(wanted)} engines", flush=True)
     build = out / "build"

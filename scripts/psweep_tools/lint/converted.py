@@ -9,14 +9,15 @@ import shutil
 import subprocess
 import tempfile
 
-from .. import configs
+import configurations
+
 from .tree import Skip, Tree
 
 _WAIVERS = "scripts/cmake/ghdl_netlist.vlt"
 
 
-def _one(tree: Tree, top: str, config: pathlib.Path, generics: dict[str, int], work: pathlib.Path) -> list[str]:
-    folder = work / top / config.stem
+def _one(tree: Tree, top: str, config: str, generics: dict[str, int], work: pathlib.Path) -> list[str]:
+    folder = work / top / config
     commands = (
         ["cmake", "-D", "GHDL=ghdl", "-D", "STANDARD=--std=93", "-D", f"TOP={top}",
          "-D", "SOURCES=" + "|".join(f"rtl/{name}" for name in tree.rtl.files.values()),
@@ -26,7 +27,7 @@ def _one(tree: Tree, top: str, config: pathlib.Path, generics: dict[str, int], w
     for command in commands:
         done = subprocess.run(command, cwd=tree.root, capture_output=True, text=True, check=False)
         if done.returncode:
-            return [*(done.stdout + done.stderr).splitlines(), f"{top} in {config.name}: see above"]
+            return [*(done.stdout + done.stderr).splitlines(), f"{top} in {config}: see above"]
     return []
 
 
@@ -35,11 +36,11 @@ def check_verilog(tree: Tree) -> list[str]:
     for program in ("ghdl", "verilator", "cmake"):
         if shutil.which(program) is None:
             raise Skip(f"{program} is not installed")
-    rtl = tree.root / "rtl"
+    none = tree.root / "no-build"  # users' own configurations are theirs
     try:
-        work = [("psweep", path, configs.engine(path)) for path in configs.engines(rtl)]
-        work += [("psweep_top", path, configs.chip(path, rtl)) for path in configs.chips(rtl)]
-    except configs.ConfigurationError as error:
+        work = [(top, name, configurations.find(name, kind, none).generics())
+                for kind, (_, _, top) in configurations.KINDS.items() for name in configurations.files(kind, none)]
+    except configurations.ConfigError as error:
         return [str(error)]
     if not work:
         return ["no configuration was found"]

@@ -27,7 +27,8 @@ CHECKS: dict[str, Check] = {
     "layout": programs.check_layout, "text": text.check_text, "links": text.check_links,
     "files": hardware.check_files, "analyse": hardware.check_analyse, "vhdl": hardware.check_vhdl,
     "attributes": hardware.check_attributes, "units": hardware.check_units, "tables": tables.check_tables,
-    "pages": programs.check_pages, "evidence": programs.check_evidence, "arrows": programs.check_arrows,
+    "pages": programs.check_pages, "evidence": programs.check_evidence, "configurations": programs.check_configurations,
+    "arrows": programs.check_arrows,
     "trace": trace, "verilog": converted.check_verilog, "format": programs.check_format,
     "shell": programs.check_shell, "python": programs.check_python, "types": programs.check_types,
 }

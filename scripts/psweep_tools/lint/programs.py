@@ -43,6 +43,11 @@ def check_evidence(tree: Tree) -> list[str]:
     return _run(tree, sys.executable, "-B", "scripts/evidence.py", "lint", always=True)
 
 
+def check_configurations(tree: Tree) -> list[str]:
+    """rtl/configs against the schemas, the schemas against VHDL, C++ and pages (configurations.py)."""
+    return _run(tree, sys.executable, "-B", "scripts/configurations.py", "check")
+
+
 def check_arrows(tree: Tree) -> list[str]:
     """Folders of sw/ and tb/ use only those above them, CMake links what they include (lint_arrows.py)."""
     return _run(tree, sys.executable, "-B", "scripts/lint_arrows.py", "--self-test") or \
