@@ -21,7 +21,7 @@ endforeach()
 set(PSWEEP_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror)
 
 # Targets of our own compile without warnings and link what their folder includes, no more and no less
-# (scripts/lint_arrows.py). What is not psweep::<library> in the lists below is not ours: packages, Verilated models.
+# (scripts/tools.py arrows). What is not psweep::<library> in the lists below is not ours: packages, Verilated models.
 
 # psweep_library(<name> [SOURCES ..] [PUBLIC ..] [PRIVATE ..]): the library of a folder, psweep_<name>, to be linked as
 # psweep::<name>. PUBLIC: what its headers include; PRIVATE: what only its sources do. Includes are relative to sw/ or

@@ -11,17 +11,20 @@ from .work import Failure
 
 # Name: module in this package whose main(arguments) does it, what it does.
 COMMANDS = {
+    "arrows": ("lint.arrows", "which folder of sw/ and tb/ uses which"),
     "ci": ("ci", "what continuous integration runs"),
     "coverage": ("coverage.main", "lines and bits that the tests reach"),
     "demo": ("demo", "one scene through float, fixed and RTL, with a report"),
     "dse": ("dse.explore", "the design space, by Snakemake"),
     "dse-node": ("dse.node", "a command in a Slurm cluster of this machine"),
     "dse-trial": ("dse.trial", "does the workflow of the design space resume?"),
+    "evidence": ("evidence.main", "what was measured on what, and what is stale"),
     "formal": ("formal", "proofs, and faults that have to be found"),
     "fresh-machine": ("flows.machine", "README's commands in a bare Debian"),
     "generics": ("generics", "generics just outside of their ranges are refused"),
     "lint": ("lint.main", "quick checks of everything that is text"),
     "mac-opinion": ("flows.opinion", "the MAC against cocotbext-eth"),
+    "mutants": ("mutants.main", "small faults in a copy of the RTL"),
     "ports": ("replay.ports", "benches and recorders, written from the ports of an entity"),
     "real": ("real", "real pairs, tabled"),
     "rules": ("replay.rules", "do the assertions in the VHDL find what they are for?"),

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 from .. import setup
+from . import arrows
 from .tree import Skip, Tree
 
 TOP_LEVEL = re.compile(r"rtl|tb|sw|constraints|scripts|docs|CMakeLists\.txt|CMakePresets\.json|Makefile|"
@@ -49,9 +50,8 @@ def check_configurations(tree: Tree) -> list[str]:
 
 
 def check_arrows(tree: Tree) -> list[str]:
-    """Folders of sw/ and tb/ use only those above them, CMake links what they include (lint_arrows.py)."""
-    return _run(tree, sys.executable, "-B", "scripts/lint_arrows.py", "--self-test") or \
-        _run(tree, sys.executable, "-B", "scripts/lint_arrows.py")
+    """Folders of sw/ and tb/ use only those above them, CMake links what they include (scripts/tools.py arrows)."""
+    return arrows.self_test() or arrows.Tree(tree.root).check()
 
 
 def cpp_files(tree: Tree) -> list[str]:

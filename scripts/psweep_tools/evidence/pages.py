@@ -5,10 +5,10 @@ import pathlib
 import re
 from dataclasses import dataclass
 
-from evidence import sources
-from evidence.manifest import BY_NAME
-from evidence.records import Record, Status
-from evidence.tables import BLOCKS, FULL, wrapped
+from . import sources
+from .manifest import BY_NAME
+from .records import Record, Status
+from .tables import BLOCKS, FULL, wrapped
 
 _BLOCK = re.compile(r"^<!-- evidence: ([\w.-]+) -->\n(.*?)^<!-- /evidence -->", re.S | re.M)
 # Changes with every edit of the RTL, so it does not count when a block is compared with its results.

@@ -1,10 +1,9 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Which folder uses which: the arrows between the folders of sw/ and tb/, in the C++ and in CMake.
 
-  scripts/lint_arrows.py [--root DIR]    check the tree
-  scripts/lint_arrows.py --graph         print every arrow and the number of includes behind it
-  scripts/lint_arrows.py --self-test     plant wrong arrows in a small tree; each has to be found
+  scripts/tools.py arrows [--root DIR]    check the tree
+  scripts/tools.py arrows --graph         print every arrow and the number of includes behind it
+  scripts/tools.py arrows --self-test     plant wrong arrows in a small tree; each has to be found
 
 Folders are listed from the lowest to the highest in the tables of sw/README.md and tb/README.md.
   - sw/ includes nothing of tb/; a folder includes only itself and folders above it in its table, tb/ all of sw/.
@@ -16,13 +15,12 @@ Folders are listed from the lowest to the highest in the tables of sw/README.md 
 import argparse
 import pathlib
 import re
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 TREES = ("sw", "tb")
 SOURCE = re.compile(r"\.(cpp|hpp|inc|cpp\.in)$")
 HEADER = re.compile(r"\.(hpp|inc)$")
@@ -190,7 +188,7 @@ class Tree:
         self.check_arrows()
         self.check_targets()
         if not (self.order and self.targets and any(i.target for i in self.includes)):
-            self.complain("lint_arrows: nothing was checked")
+            self.complain("arrows: nothing was checked")
         return self.problems
 
     def graph(self) -> list[str]:
@@ -248,23 +246,20 @@ def self_test() -> list[str]:
     return wrong
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="scripts/tools.py arrows", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=pathlib.Path, default=ROOT)
     parser.add_argument("--graph", action="store_true")
     parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
+    options = parser.parse_args(arguments)
+    if options.self_test:
         problems = self_test()
-    elif arguments.graph:
-        print("\n".join(Tree(arguments.root).graph()))
+    elif options.graph:
+        print("\n".join(Tree(options.root).graph()))
         return 0
     else:
-        problems = Tree(arguments.root).check()
+        problems = Tree(options.root).check()
     for problem in problems:
         print(problem)
     return 1 if problems else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

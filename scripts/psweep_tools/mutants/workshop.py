@@ -11,8 +11,8 @@ import subprocess
 import threading
 import time
 
-from mutants.chains import Test
-from psweep_tools.vhdl import Rtl
+from .chains import Test
+from ..vhdl import Rtl
 
 FOLDERS = ("CMakeLists.txt", "rtl", "sw", "tb", "scripts")
 # Large and slow; no test used here needs them.
@@ -54,7 +54,7 @@ def synchronise(source: pathlib.Path, target: pathlib.Path) -> list[str]:
 class Job:
     """One copy of the tree and its builds."""
 
-    _running: set[subprocess.Popen] = set()
+    _running: set[subprocess.Popen[bytes]] = set()
     _lock = threading.Lock()
     stopped = threading.Event()
 
@@ -134,7 +134,7 @@ class Job:
         return self.run(log, limit, test.command, self.at / test.build, test.environment)
 
 
-def _kill(process: subprocess.Popen) -> None:
+def _kill(process: subprocess.Popen[bytes]) -> None:
     try:
         os.killpg(process.pid, signal.SIGKILL)
     except ProcessLookupError:

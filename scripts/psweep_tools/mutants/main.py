@@ -1,5 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The work of scripts/mutants.sh."""
+"""Tests the tests: puts one small fault at a time into a copy of the RTL (an operator, a constant, a condition, an
+assignment), and the tests of `make sim` have to notice it. docs/mutants.md says how and with what result.
+
+  scripts/mutants.sh [options] [ENTITY ...]      default: all entities of rtl/files.f, the chip's parts first
+    --count N    N mutants an entity (default: one for each 50 lines; at least ten of a file of more than 200 lines,
+                 two of a smaller one)
+    --seed N     draws others (default 1)
+    --minutes N  begins nothing new after that time; the next run goes on
+    --only ID    that mutant alone (ENTITY.NUMBER, as in the list), drawn or not
+    --list       shows what would be tested and by which tests, tests nothing
+    --report     only the table of what is known
+    --strict     no mercy for those in the list of equivalents: for tests of this script
+    --out DIR    where to work (default: build/mutants)
+
+Works in build/mutants, one copy of the tree and its builds per job; the checkout is not touched. The entity's own
+test comes first, then one small engine or chip, then the tests of the whole; the first that fails ends it. A mutant
+that cannot be built is 'invalid' and another is drawn. A mutant that survives has to be in
+scripts/mutants_equivalent.txt, with a reason. Results are kept in build/mutants/results.jsonl: an interrupted run
+goes on, and a mutant whose entity and tests are unchanged is not run again. Environment: JOBS (default: all cores),
+VERBOSE=1 (keeps all logs).
+Exit code 1 if a mutant survived that is not in that list, if one in the list was killed, if an entry of the list fits
+no mutant, if the run is not finished, or if nothing was tested."""
 import argparse
 import json
 import os
@@ -9,15 +30,12 @@ import sys
 import time
 from typing import Any
 
-sys.dont_write_bytecode = True
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from . import campaign as c
+from . import faults, workshop
+from .chains import Chains
+from ..vhdl import Rtl
 
-from mutants import campaign as c  # noqa: E402
-from mutants import faults, workshop  # noqa: E402
-from mutants.chains import Chains  # noqa: E402
-from psweep_tools.vhdl import Rtl  # noqa: E402
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 LIST = ROOT / "scripts" / "mutants_equivalent.txt"
 
 
@@ -26,7 +44,8 @@ def say(text: str) -> None:
 
 
 def options_of(arguments: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="scripts/mutants.sh")
+    parser = argparse.ArgumentParser(prog="scripts/mutants.sh", description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("entities", nargs="*")
     parser.add_argument("--count", type=int)
     parser.add_argument("--seed", type=int, default=1)
@@ -189,7 +208,3 @@ def _fits(key: str, tree: pathlib.Path, seed: int) -> bool:
     if entity not in rtl.files:
         return False
     return any(m.key == key for m in faults.candidates(entity, rtl.text(entity).split("\n"), seed))
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

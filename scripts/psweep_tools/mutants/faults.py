@@ -159,7 +159,7 @@ def candidates(entity: str, text: list[str], seed: int) -> list[Mutant]:
         if not is_clock:
             if (process and re.match(r"\s*[a-z]\w*(\([^<]*\))?\s*(<=|:=)[^;]*;\s*$", code, re.I)
                     and not re.match(r"\s*constant\b", code, re.I)):
-                faults.append(("deletion", re.match(r"\s*", code)[0] + "null;"))
+                faults.append(("deletion", code[:len(code) - len(code.lstrip())] + "null;"))
             if m := re.match(r"(\s*)(if|elsif)\s+(.*\S)\s+then\s*$", code, re.I):
                 faults += [("branch", f"{m[1]}{m[2]} false then"), ("branch", f"{m[1]}{m[2]} true then")]
             if m := _WHEN.match(code):

@@ -3,9 +3,9 @@
 import pathlib
 import re
 
-from evidence import sources
-from mutants import faults
-from psweep_tools import vhdl
+from . import sources
+from ..mutants import faults
+from .. import vhdl
 
 
 def gone(root: pathlib.Path = sources.ROOT) -> list[str]:
@@ -18,7 +18,9 @@ def _lines(root: pathlib.Path, entity: str) -> list[str]:
 
 
 def _holes(root: pathlib.Path) -> list[str]:
-    out, entity, there = [], "", {}
+    out: list[str] = []
+    entity = ""
+    there: dict[str, int] = {}
     name = "scripts/coverage_holes.txt"
     for n, line in enumerate((root / name).read_text().splitlines(), 1):
         if m := re.fullmatch(r"rtl/(?:\w+/)*(\w+)\.vhd", line):

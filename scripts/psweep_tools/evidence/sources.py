@@ -6,9 +6,9 @@ import re
 import subprocess
 from collections.abc import Callable, Iterable
 
-from psweep_tools import vhdl
+from .. import vhdl
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 _CPP = re.compile(r'R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])\'|//[^\n]*|/\*.*?\*/', re.S)
 
 

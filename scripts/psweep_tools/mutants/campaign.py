@@ -14,10 +14,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from evidence import sources
-from mutants.chains import Chains, Test
-from mutants.faults import Mutant
-from mutants.workshop import BrokenTest, Job, Stopped
+from ..evidence import sources
+from .chains import Chains, Test
+from .faults import Mutant
+from .workshop import BrokenTest, Job, Stopped
 
 MOST_INVALID = 25  # in a row, then a file has no more places
 KILLED, NO_END, INVALID, SURVIVED, WAITING = "killed", "no end", "invalid", "survived", "waiting"

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables of figures that stand in the pages by hand. Each is inside a block, or its section says at which commit it was
-measured ('at commit 1234abc'), or scripts/evidence/not_measured.txt says why it is no measurement."""
+measured ('at commit 1234abc'), or scripts/psweep_tools/evidence/not_measured.txt says why it is no measurement."""
 import fnmatch
 import pathlib
 import re
 
-from evidence import sources
-from evidence.pages import page_files
+from . import sources
+from .pages import page_files
 
-WAIVERS = "scripts/evidence/not_measured.txt"
+WAIVERS = "scripts/psweep_tools/evidence/not_measured.txt"
 # Cells that are a figure: a number, with a unit or several of them.
 _FIGURE = re.compile(r"\**[+-]?(about )?\d[\d., x/+%()-]*"
                      r"( (LUT|FF|RAMB36|DSP|Mbit/s|Mbit|ms|us|s|M|%|MHz|mm|K|clocks).*)?\**$")

@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from evidence import sources
-from psweep_tools import vhdl
+from ..evidence import sources
+from .. import vhdl
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("mutants", ("mutants",),
          ("@chip", *BUILD, *MODEL, *BUILT, "rtl/configs/chip/**", "tb/units/**", "tb/engine/**", "tb/chip/**",
           "!tb/chip/link_speed.cpp", "!tb/chip/test_goodput.cpp", "!tb/chip/test_link*", "tb/replay/**", "tb/soak/**",
-          "sw/desk/**", "sw/net/**", "sw/plan/**", "sw/scene/**", "scripts/mutants/**",
+          "sw/desk/**", "sw/net/**", "sw/plan/**", "sw/scene/**", "scripts/psweep_tools/mutants/**",
           "scripts/mutants_equivalent.txt"),
          60, "build/evidence/mutants.json", speaks_for_itself=True, takes_a_copy=True,
          goes_on="mutant by mutant, also after edits: build/mutants/results.jsonl"),

@@ -12,8 +12,8 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from evidence import sources
-from evidence.manifest import Kind
+from . import sources
+from .manifest import Kind
 
 FOLDER = sources.ROOT / "docs" / "evidence"
 

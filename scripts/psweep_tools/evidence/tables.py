@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables of the pages out of the records. Each block: the kinds it tells of, and a function of their records (those
 that there are) and of where each is from, in words."""
+import functools
 import json
 import re
 import textwrap
 from collections.abc import Callable
 from typing import Any
 
-from evidence import sources
-from evidence.records import Record
+from . import sources
+from .records import Record
 
 Records = dict[str, Record]
 Origins = dict[str, str]
@@ -431,10 +432,13 @@ def accuracy_unseen(r: dict[str, Any]) -> str:
                              for row in rows) + ".")
 
 
+def _all_columns(key: str, r: dict[str, Any]) -> str:
+    return table(_SCENE + _BESIDE, _rows(r[key], 12))
+
+
 for _name, _title in (("scenes", "Every scene"), ("unseen", "Scenes with seeds that nobody looked at"),
                       ("formats", "Every number format")):
-    complete(f"accuracy.{_name}", "accuracy", _title)(
-        lambda r, key=_name: table(_SCENE + _BESIDE, _rows(r[key], 12)))
+    complete(f"accuracy.{_name}", "accuracy", _title)(functools.partial(_all_columns, _name))
 
 
 _MEASURES = (("M1, RMS of errors up to 2 cm, mm", 2), ("M2.a, larger errors, %", 2), ("M2.b, their RMS, mm", 0),

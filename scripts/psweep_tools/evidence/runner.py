@@ -7,8 +7,8 @@ import subprocess
 import sys
 import time
 
-from evidence import pages, parsers, records, sources
-from evidence.manifest import KINDS, Kind
+from . import pages, parsers, records, sources
+from .manifest import KINDS, Kind
 
 OUT = sources.ROOT / "build" / "evidence"
 

@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from evidence import sources
-from evidence.manifest import Kind
+from . import sources
+from .manifest import Kind
 
 Results = dict[str, Any]
 
@@ -41,7 +41,7 @@ def markdown_tables(text: str) -> list[list[list[str]]]:
 
 
 def mutants(text: str) -> Results:
-    data = json.loads(text)
+    data: dict[str, Any] = json.loads(text)
     if not data["all"].get("tested"):
         raise NothingFound("no mutant was tested")
     data["problems"] = [p for p in data["problems"] if not p.startswith(("survived", "not finished"))]
