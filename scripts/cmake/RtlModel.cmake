@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # VHDL entity + generics -> Verilated C++ library.
 #
-#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [EDIT <script>])
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [UPSETS <option> ..])
 #     Static library <name> with header V<name>.h (class V<name>) for an entity of rtl/files.f. TRACE: the model can
 #     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
 #     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).

@@ -3,7 +3,7 @@
 # Verilator decides how many C++ files it writes; CMake must know its sources beforehand. So two files include them
 # all: FAST the code of every clock, SLOW the rest (constructors, reset, tracing declarations).
 # INPUTS: what depends on inputs is evaluated only while psweep_inputs_changed (inputs_changed.cpp). Verilator does it
-# before every edge, which is an eighth of the work of an engine that sweeps. A version that writes it in another way is
+# before every edge, which is a fifth of the time of an engine that sweeps. A version that writes it in another way is
 # an error: the condition has to be written in its way here.
 file(GLOB files RELATIVE ${OBJ} ${OBJ}/*.cpp)
 list(SORT files)
