@@ -13,7 +13,7 @@ FLOW_OPTIONS = $(if $(BOARD),--board $(BOARD)) $(if $(TOP),--top $(TOP)) $(if $(
 
 .PHONY: help
 help: ## This list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 23
 	@echo '  All of them: JOBS=n (default: all cores), VERBOSE=1, SETUP=no (do not install packages)'
 
 .PHONY: setup
@@ -146,7 +146,7 @@ real: setup ## Real stereo pairs through float, fixed and RTL   DATA=<folder>: b
 	@scripts/real.sh '$(DATA)'
 
 .PHONY: config
-config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 PLANE_COLS=256 ...: keys of rtl/configs/engine.schema.json
+config: setup ## Build one more RTL configuration   NAME=w9 WINDOW=9 ..: keys of rtl/configs/engine.schema.json
 	@scripts/configurations.py new $(filter-out JOBS=% VERBOSE=% SETUP=%,$(MAKEOVERRIDES))
 	@scripts/build.sh psweep
 

@@ -11,7 +11,7 @@
     nxpython     the flow against a stand-in that knows the real module's methods, arguments and options
     ise          the flow against stand-ins of xst .. bitgen; failing programs, missed timing, no programs
     reports      the readers of reports on short ones, whole and damaged
-    scripts      syntax for the tools' Pythons (3.6); --help
+    scripts      syntax for the tools' Pythons (3.8); --help
   scripts/check_flows.py --faults       a fault each into a copy of the tree: does its check tell? (20 s)
   scripts/check_flows.py --fusesoc      FuseSoC itself (from the Python Package Index, into build/flows/venv): cores are
                                         found, analysed and elaborated by GHDL, a wrong parameter is refused
@@ -130,7 +130,7 @@ def check_sources(work):
     function = re.search(r"^function\(psweep_rtl_sources .*?^endfunction\(\)", cmake, re.M | re.S)
     need(function, "scripts/cmake/RtlModel.cmake: no function psweep_rtl_sources")
     for top in project.TOPS:
-        wanted = listed[:listed.index(str(ROOT / "rtl" / (top + ".vhd"))) + 1]
+        wanted = listed[:[pathlib.Path(name).stem for name in listed].index(top) + 1]
         lists = {}
         for board in project.boards("ise"):
             lists["ISE, " + board] = project_files(prepared(work, top, board), top)
@@ -153,8 +153,8 @@ def check_sources(work):
     engine, chip = core("psweep"), core("psweep_top")
     need([str(ROOT / "rtl" / f) for f in engine[0] + chip[0]] == listed,
          "FuseSoC: files differ from rtl/files.f: {} (run scripts/flows/cores.py)".format(
-             sorted(set(engine[0] + chip[0]) ^ {pathlib.Path(f).name for f in listed}) or "order"))
-    need(engine[0][-1] == "psweep.vhd", "FuseSoC: the engine ends with {}".format(engine[0][-1]))
+             sorted({str(ROOT / "rtl" / f) for f in engine[0] + chip[0]} ^ set(listed)) or "order"))
+    need(pathlib.Path(engine[0][-1]).name == "psweep.vhd", "FuseSoC: the engine ends with {}".format(engine[0][-1]))
     name = re.search(r"^name: (\S+)$", (ROOT / "rtl" / "psweep.core").read_text(), re.M)[1]
     need(chip[3] == [name] and not engine[3], "FuseSoC: the chip depends on {}".format(chip[3]))
     return compared + len(listed), "files"
@@ -738,13 +738,15 @@ def check_reports(work):
 
 def check_scripts(work):
     files = [f for folder in ("scripts/flows", "scripts/ise", "scripts/nxmap") for f in (ROOT / folder).glob("*.py")]
-    files += [HERE / "cost" / name for name in ("measure.py", "families.py", "netlist.py")]
+    files += [HERE / "cost" / name for name in ("measure.py", "families.py", "netlist.py", "points.py")]
+    files += [HERE / "psweep_tools" / name for name in ("__init__.py", "paths.py")]
+    files += (HERE / "psweep_tools" / "vhdl").glob("*.py")
     files += sorted((ROOT / "constraints").glob("*/*.py"))
     for file in files:
         try:
-            ast.parse(file.read_text(), str(file), feature_version=(3, 6))
+            ast.parse(file.read_text(), str(file), feature_version=(3, 8))
         except SyntaxError as error:
-            raise Wrong("{}: not for Python 3.6: {}".format(file, error))
+            raise Wrong("{}: not for Python 3.8: {}".format(file, error))
     for script in ("ise/ise.py", "nxmap/nxmap.py"):
         call([sys.executable, HERE / script, "--help"], says="--board", cwd=str(work))
     boards = project.boards()
@@ -785,11 +787,12 @@ FAULTS = (
     ("sources", "rtl/psweep_top.core", "      - mac_tx.vhd\n", "", "FuseSoC: files differ"),
     ("sources", "rtl/psweep.core", "      - ram_sdp.vhd\n      - ram_2r.vhd\n",
      "      - ram_2r.vhd\n      - ram_sdp.vhd\n", "FuseSoC: files differ from rtl/files.f: order"),
-    ("sources", "scripts/flows/project.py", 'return [RTL / f for f in files]',
-     'return [RTL / f for f in files if f != "divider.vhd"]', "differ from rtl/files.f"),
+    ("sources", "scripts/flows/project.py", "    return files\n",
+     '    return [f for f in files if f.name != "divider.vhd"]\n', "differ from rtl/files.f"),
     ("sources", "scripts/cmake/RtlModel.cmake", "list(APPEND sources ${CMAKE_SOURCE_DIR}/rtl/${line})",
      "list(INSERT sources 0 ${CMAKE_SOURCE_DIR}/rtl/${line})", "CMake: files of"),
-    ("analyse", "rtl/files.f", "divider_mul.vhd\nsimilarity.vhd\n", "similarity.vhd\ndivider_mul.vhd\n", "divider_mul"),
+    ("analyse", "rtl/files.f", "divider_mul.vhd\nsimilarity.vhd\n",
+     "similarity.vhd\ndivider_mul.vhd\n", "divider_mul"),
     ("analyse", "rtl/configs/engine/tile.json", '"window": 13', '"window": 12', "GHDL ends with 1"),
     ("generics", "rtl/psweep_top.core", "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 2}",
      "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 4}", "parameters differ from the VHDL"),
@@ -841,8 +844,9 @@ FAULTS = (
     ("ise", "constraints/virtex5qv/board.json", "xqr5vfx130-1-cf1752", "xqr5vfx130", "part xqr5vfx130"),
     ("reports", "scripts/ise/reports.py", "r\"\\d+/(\\d+)\\Z\"", "r\"(\\d+)/\\d+\\Z\"", "instead of"),
     ("reports", "scripts/ise/reports.py", "counts[\"ram36\"] + counts[\"ram18\"] / 2", "counts[\"ram36\"]", "Virtex-6"),
-    ("scripts", "scripts/ise/ise.py", "missing = [program", "print(missing := [])\n        missing = [program",
-     "not for Python 3.6"),
+    ("scripts", "scripts/ise/ise.py", "missing = [program",
+     "match 1:\n            case _:\n                pass\n        missing = [program",
+     "not for Python 3.8"),
     ("scripts", "constraints/ml605/board.json", '"known"', '"sure"', "board.json: pads"),
 )
 

@@ -13,7 +13,7 @@
   --kind engine|chip, --json (list, show, generics), --build FOLDER (default build)
 
 A key that is left out takes the schema's default. Users' own configurations lie in build/configs and build/chips.
-Python 3.6 and later, without packages: the vendors' tools bring their own. Exit code 2 and one line with file and key
+Python 3.8 and later, without packages: the vendors' tools bring their own. Exit code 2 and one line with file and key
 if something is wrong."""
 import argparse
 import functools
@@ -22,6 +22,11 @@ import pathlib
 import re
 import sys
 from typing import Any, Dict, List, NamedTuple, Optional, Tuple
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+
+from psweep_tools import vhdl  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CONFIGS = ROOT / "rtl" / "configs"
@@ -92,7 +97,8 @@ class Configuration(NamedTuple):
 
 def schema(kind: str) -> Dict[str, Any]:
     """The schema as it stands in the file."""
-    return json.loads((CONFIGS / f"{kind}.schema.json").read_text())
+    content: Dict[str, Any] = json.loads((CONFIGS / f"{kind}.schema.json").read_text())
+    return content
 
 
 @functools.lru_cache(maxsize=None)
@@ -250,15 +256,14 @@ def header_text() -> str:
 
 
 # Checks ---------------------------------------------------------------------------------------------------------------
-_ASSERT = re.compile(r"^\s*assert ((?:[^;]|\n)*?)\s*report \"(\w+): (G_\w+)\"", re.M)
 _BOUND = re.compile(r"(G_\w+) (>=|<=|=|/=|mod) (\d+)(?: = (\d+))?")
 
 
-def vhdl_limits(text: str) -> Dict[str, List[Tuple[str, int, int]]]:
+def vhdl_limits(design: vhdl.Design) -> Dict[str, List[Tuple[str, int, int]]]:
     """What the assertions of an entity ask of its generics: operator, number, and the remainder of a mod."""
     found: Dict[str, List[Tuple[str, int, int]]] = {}
-    for match in _ASSERT.finditer(re.sub(r"--.*", "", text)):
-        for generic, operator, number, rest in _BOUND.findall(match[1]):
+    for assertion in design.assertions:
+        for generic, operator, number, rest in _BOUND.findall(assertion.condition if assertion.of_generic else ""):
             found.setdefault(generic, []).append((operator, int(number), int(rest or 0)))
     return found
 
@@ -272,9 +277,8 @@ def _agrees(field: Field, limits: List[Tuple[str, int, int]]) -> bool:
             return True
         if equal:
             return value in equal
-        tests = {">=": lambda n, _: value >= n, "<=": lambda n, _: value <= n, "/=": lambda n, _: value != n,
-                 "mod": lambda n, rest: value % n == rest}
-        return all(tests[operator](number, rest) for operator, number, rest in limits)
+        return all({">=": value >= number, "<=": value <= number, "/=": value != number,
+                    "mod": value % max(number, 1) == rest}[operator] for operator, number, rest in limits)
 
     numbers = {n for operator, n, _ in limits if operator != "mod"} | {field.lowest, *field.allowed}
     if field.highest is not None:
@@ -285,15 +289,14 @@ def _agrees(field: Field, limits: List[Tuple[str, int, int]]) -> bool:
 def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> List[str]:
     """All that is wrong, a line each."""
     found: List[str] = []
-    sources = {path.stem: path.read_text() for path in rtl.rglob("*.vhd")}
-    declared = re.compile(r"^\s*(G_\w+)\s*:\s*integer\s*:=\s*(-?\d+)", re.M)
+    sources = vhdl.Rtl(rtl)
+    asserted = {unit: vhdl_limits(sources.design(unit)) for unit in sources.units}
     info = {int(word): value for word, value in
-            re.findall(r"v_words\((\d+)\)\s*:=\s*std_logic_vector\(to_unsigned\((G_\w+), 32\)\)", sources["responder"])}
+            re.findall(r"v_words\((\d+)\)\s*:=\s*std_logic_vector\(to_unsigned\((G_\w+), 32\)\)",
+                       sources.text("responder"))}
     seen = set()
     for kind, (folder, _, entity) in KINDS.items():
-        text = re.sub(r"--.*", "", sources[entity])
-        block = re.search(rf"entity {entity} is\s*generic \((.*?)\);\s*port", text, re.S)
-        generics = {name: int(value) for name, value in declared.findall(block[1] if block else "")}
+        generics = {generic.name: int(generic.default) for generic in sources.entity(entity).generics}
         for field in fields(kind):
             where = f"rtl/configs/{kind}.schema.json: {field.key}"
             seen.add(field.generic)
@@ -305,8 +308,8 @@ def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> Lis
                 found.append(f"{where}: default {field.default} is not {field.range()}")
             if field.info and info.get(field.info) != field.generic:
                 found.append(f"{where}: word {field.info} of INFO is {info.get(field.info)} in responder")
-            limits = [limit for name in field.asserted or (f"{n}.{field.generic}" for n in sources)
-                      for limit in vhdl_limits(sources[name.split(".")[0]]).get(name.split(".")[1], [])]
+            limits = [limit for name in field.asserted or (f"{n}.{field.generic}" for n in sources.units)
+                      for limit in asserted[name.split(".")[0]].get(name.split(".")[1], [])]
             if not limits:
                 found.append(f"{where}: no assertion in rtl/ checks {field.generic}")
             elif not _agrees(field, limits):

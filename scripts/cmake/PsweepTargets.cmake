@@ -21,7 +21,7 @@ endforeach()
 set(PSWEEP_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror)
 
 # Targets of our own compile without warnings and link what their folder includes, no more and no less
-# (scripts/lint_arrows.py). What is not psweep::<library> in the lists below is not ours: packages, Verilated models.
+# (scripts/tools.py arrows). What is not psweep::<library> in the lists below is not ours: packages, Verilated models.
 
 # psweep_library(<name> [SOURCES ..] [PUBLIC ..] [PRIVATE ..]): the library of a folder, psweep_<name>, to be linked as
 # psweep::<name>. PUBLIC: what its headers include; PRIVATE: what only its sources do. Includes are relative to sw/ or
@@ -62,7 +62,7 @@ endfunction()
 
 # psweep_test(<name> SOURCES .. LIBS ..): Catch2 test program with its own main from Catch2, one ctest entry per case.
 # A case that asserts nothing fails, and so does a name that matches no case. A case whose data is absent prints
-# 'SKIPPED: <reason>' and then calls SUCCEED(): it is counted as skipped (scripts/summary.sh).
+# 'SKIPPED: <reason>' and then calls SUCCEED(): it is counted as skipped (scripts/tools.py sim).
 function(psweep_test name)
   cmake_parse_arguments(A "" "" "SOURCES;LIBS;DEFINITIONS;LABELS" ${ARGN})
   psweep_program(${name} SOURCES ${A_SOURCES} LIBS ${A_LIBS} psweep_catch)

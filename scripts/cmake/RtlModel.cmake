@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # VHDL entity + generics -> Verilated C++ library.
 #
-#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [EDIT <script>])
-#     Static library <name> with header V<name>.h (class V<name>) for entity rtl/<entity>.vhd. TRACE: the model can
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [UPSETS <option> ..])
+#     Static library <name> with header V<name>.h (class V<name>) for an entity of rtl/files.f. TRACE: the model can
 #     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
 #     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).
-#     EDIT: perl <script> IN.v OUT.v <name>.inc changes the Verilog first; the third file is its own.
+#     UPSETS: registers can be upset: options of `scripts/tools.py upsets`, which writes <name>.inc as well.
 #   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
 #     ctest case: elaboration with these generics has to fail, and the message has to match. Without MESSAGE it has to
 #     succeed.
@@ -17,6 +17,8 @@
 # make and Python. So Verilator only writes C++ here, and CMake compiles that (with its jobs, its ccache).
 find_program(PSWEEP_GHDL ghdl REQUIRED)
 find_program(PSWEEP_VERILATOR verilator REQUIRED)
+find_program(PSWEEP_PYTHON python3 REQUIRED)
+set(PSWEEP_TOOLS ${PROJECT_SOURCE_DIR}/scripts/tools.py)
 find_package(ZLIB)
 execute_process(
   COMMAND ${PSWEEP_VERILATOR} --getenv VERILATOR_ROOT
@@ -70,6 +72,15 @@ else()
   message(STATUS "psweep: zlib not found, models are built without waves")
 endif()
 
+# psweep_tool_files(<out> <subpackage> ..): Python files that a command of scripts/tools.py depends on.
+function(psweep_tool_files out)
+  list(TRANSFORM ARGN PREPEND ${PROJECT_SOURCE_DIR}/scripts/psweep_tools/)
+  list(TRANSFORM ARGN APPEND /*.py)
+  file(GLOB files ${PROJECT_SOURCE_DIR}/scripts/psweep_tools/*.py ${ARGN})
+  list(FILTER files EXCLUDE REGEX "/cli\\.py$")
+  set(${out} ${files} PARENT_SCOPE)
+endfunction()
+
 # Files of rtl/files.f up to and including <entity>.vhd, as absolute paths in `out`.
 function(psweep_rtl_sources entity out)
   set(list_file ${CMAKE_SOURCE_DIR}/rtl/files.f)
@@ -91,8 +102,15 @@ function(psweep_rtl_sources entity out)
   message(FATAL_ERROR "rtl/files.f has no file ${entity}.vhd")
 endfunction()
 
+# The file of an entity, by rtl/files.f.
+function(psweep_rtl_file entity out)
+  psweep_rtl_sources(${entity} sources)
+  list(GET sources -1 file)
+  set(${out} ${file} PARENT_SCOPE)
+endfunction()
+
 function(rtl_model name)
-  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES" "TOP;EDIT" "GENERICS" ${ARGN})
+  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES" "TOP" "GENERICS;UPSETS" ${ARGN})
   psweep_rtl_sources(${A_TOP} sources)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
   set(obj ${dir}/obj)
@@ -110,16 +128,22 @@ function(rtl_model name)
     set(trace_flag --trace-fst)
   endif()
 
+  set(upset_tool)
+  if(A_UPSETS)
+    psweep_tool_files(upset_tool upsets vhdl)
+  endif()
+  string(REPLACE ";" "|" upsets "${A_UPSETS}")
   string(REPLACE ";" "|" source_list "${sources}")
   string(REPLACE ";" "|" generic_list "${A_GENERICS}")
   add_custom_command(
     OUTPUT ${dir}/${A_TOP}.v
     COMMAND
       ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
-      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES} -D EDIT=${A_EDIT}
-      -D NOTES=${dir}/${name}.inc -P ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
+      SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES}
+      -D UPSETS=${upsets} -D SITES=${dir}/${name}.inc -D PYTHON=${PSWEEP_PYTHON} -P
+      ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake ${PSWEEP_RTL_MODEL_DIR}/EditedSources.cmake
-            ${A_EDIT}
+            ${upset_tool}
     COMMENT "GHDL ${name}"
     VERBATIM)
   set(waivers ${PSWEEP_RTL_MODEL_DIR}/ghdl_netlist.vlt)

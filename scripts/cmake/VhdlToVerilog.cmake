@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> [-D BOTH_EDGES=ON]
-#       [-D EDIT=<Perl or Python script> -D NOTES=<its third file>] -P VhdlToVerilog.cmake
+#       [-D UPSETS=option|.. -D SITES=<file> -D PYTHON=] -P VhdlToVerilog.cmake
+# UPSETS: registers that can be upset, by scripts/tools.py upsets, which lists them in SITES.
 # Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
 # What stands between translate_off and translate_on behind a comment '-- collision:' is translated all the same: a
 # word that a RAM reads while it is written is random in the models, as it is 'X' in the VHDL, not the old one of the
@@ -27,26 +28,21 @@ function(run_ghdl)
   endif()
 endfunction()
 edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
-               ${SOURCES})
+               "-- collision:" ${SOURCES})
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${models})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
-if(EDIT)
-  set(interpreter perl)
-  if(EDIT MATCHES "\\.py$")
-    set(interpreter python3)
-  endif()
-  execute_process(COMMAND ${interpreter} ${EDIT} ${DIR}/raw.v ${DIR}/edited.v ${NOTES} RESULT_VARIABLE code)
-  if(NOT code EQUAL 0)
-    message(FATAL_ERROR "${EDIT} failed")
-  endif()
+if(UPSETS)
+  string(REPLACE "|" ";" UPSETS "${UPSETS}")
+  execute_process(COMMAND ${PYTHON} -B ${CMAKE_CURRENT_LIST_DIR}/../tools.py upsets ${DIR}/raw.v ${DIR}/edited.v
+                          ${SITES} ${TOP} ${UPSETS} COMMAND_ERROR_IS_FATAL ANY)
   file(RENAME ${DIR}/edited.v ${DIR}/raw.v)
 endif()
 if(BOTH_EDGES)
   # Registers take their values at both edges of the only clock.
   file(READ ${DIR}/raw.v text)
   string(REPLACE "@(posedge clk)" "@(posedge clk or negedge clk)" text "${text}")
-  if(NOT text MATCHES "negedge clk")
-    message(FATAL_ERROR "${TOP}: no register of clk found")
+  if(NOT text MATCHES "negedge clk" OR text MATCHES "posedge clk or posedge|always @[(]negedge|posedge [^c]")
+    message(FATAL_ERROR "${TOP}: no register of clk found, or one of another clock or with a reset of its own")
   endif()
   file(WRITE ${DIR}/raw.v "${text}")
 endif()

@@ -3,7 +3,7 @@
 """What one entity costs in one FPGA family: LUT, FF, block RAM, DSP, carry, longest path in LUTs; as a table or JSON.
 
   scripts/cost/measure.py --entity E --family F [G_X=n ...]
-    --entity E        file rtl/E.vhd; generics that are not given are as by default
+    --entity E        an entity of rtl/files.f; generics that are not given are as by default
     --unit U          of all that, only unit U (similarity, ..) with the generics that it has there
     --config NAME     generics of rtl/configs/engine/NAME.json or build/configs/NAME.json; rtl/configs/chip/NAME.json
                       for psweep_top. G_X=n overrides one of them
@@ -43,6 +43,8 @@ import configurations  # noqa: E402
 import families  # noqa: E402  (the folder of this script, whatever the current one is)
 import netlist as netlists  # noqa: E402
 
+from psweep_tools import vhdl  # noqa: E402
+
 SCHEMA = 1
 # Where --hierarchy keeps the hierarchy, as the paper's table 4 does: units of the engine, then of the arbiter.
 ENGINE_UNITS = ("control", "address_generator", "storage", "interpolation", "similarity", "updating")
@@ -73,18 +75,21 @@ def tool_version():
     return run.stdout.strip()
 
 
+@functools.lru_cache(maxsize=None)
+def read_rtl(rtl):
+    return vhdl.Rtl(pathlib.Path(rtl))
+
+
 def all_entities(rtl):
-    lines = [line.split("#")[0].strip() for line in (rtl / "files.f").read_text().splitlines()]
-    return [line for line in lines if line]
+    return [f"{unit}.vhd" for unit in read_rtl(rtl).units]
 
 
 def generics_of(entity, rtl):
     """Names of the generics of an entity, with defaults, read from its declaration."""
-    text = re.sub(r"--.*", "", (rtl / f"{entity}.vhd").read_text())
-    block = re.search(rf"entity {entity} is\s*(?:generic\s*\((.*?)\)\s*;\s*)?port", text, re.S | re.I)
-    if not block:
-        raise CostError(f"no entity {entity} in {rtl}/{entity}.vhd")
-    return dict(re.findall(r"(G_\w+)\s*:\s*\w+(?:\s+range[^:;]*)?\s*(?::=\s*([^;\s)]+))?", block[1] or ""))
+    try:
+        return {generic.name: generic.default for generic in read_rtl(rtl).entity(entity).generics}
+    except vhdl.VhdlError as error:
+        raise CostError(str(error)) from None
 
 
 def config_generics(entity, config, rtl):
@@ -136,14 +141,11 @@ def name_registers(verilog):
 
 def convert(entity, generics, rtl, work):
     """VHDL to one Verilog text, by GHDL."""
-    files = all_entities(rtl)
-    if f"{entity}.vhd" not in files:
-        raise CostError(f"{rtl}/files.f has no {entity}.vhd")
     known = generics_of(entity, rtl)
     for name in generics:
         if name not in known:
             raise CostError(f"{entity} has no generic {name}: " + ", ".join(known))
-    sources = [str(rtl / f) for f in files[:files.index(f"{entity}.vhd") + 1]]
+    sources = [str(path) for path in read_rtl(rtl).sources(entity)]
     (work / "ghdl").mkdir()
     options = ["--std=93", f"--workdir={work}/ghdl"]
 
@@ -196,14 +198,14 @@ def measure(entity, family, generics=None, hierarchy=False, no_dsp=False, rtl=No
     generics = {k: int(v) for k, v in (generics or {}).items()}
     if family not in families.FAMILIES:
         raise CostError(f"unknown family '{family}': " + ", ".join(families.FAMILIES))
-    if not (rtl / f"{entity}.vhd").exists():
-        raise CostError(f"no {rtl}/{entity}.vhd")
+    if entity not in read_rtl(rtl).files:
+        raise CostError(f"{rtl}/files.f has no {entity}.vhd")
     with tempfile.TemporaryDirectory(prefix="psweep-cost-") as folder:
         work = pathlib.Path(folder)
         verilog, repaired = convert(entity, generics, rtl, work)
         top = entity
         if unit:
-            verilog, top = take_unit(verilog, unit, [f[:-4] for f in all_entities(rtl)])
+            verilog, top = take_unit(verilog, unit, read_rtl(rtl).units)
         question = [verilog, top, family, hierarchy, no_dsp, list(units), tool_version(), script_hash(family)]
         key = hashlib.sha256(json.dumps(question).encode()).hexdigest()
         kept = pathlib.Path(os.environ.get("COST_CACHE", ROOT / "build" / "cost" / "cache")) / f"{key}.json"

@@ -242,7 +242,7 @@ def merge_multiplier_registers(netlist):
                 driver[cell["connections"]["Q"][0]] = name
         sinks = _sinks(module)
         for cell in [c for c in cells.values() if c["type"] == "MULT18X18D"]:
-            pins, parameters = cell["connections"], cell["parameters"]
+            pins = cell["connections"]
             used = [port for port, bits in pins.items() if re.fullmatch(r"P\d+", port) and bits and sinks.get(bits[0])]
             ends = [sinks[pins[port][0]] for port in used]
             clocks = {tuple(cells[e[0][0]]["connections"]["CLK"]) for e in ends

@@ -36,16 +36,17 @@ import families  # noqa: E402
 import measure as cost  # noqa: E402
 import netlist as netlists  # noqa: E402
 
+from psweep_tools import verilog as verilog_text  # noqa: E402
+
 DEVICE = ["--85k", "--speed", "8", "--package", "CABGA756"]
 
 
 def ports_of(verilog, entity):
     """(direction, width, name) of the ports of a module that GHDL wrote."""
-    block = re.search(rf"^module {entity}\s*\((.*?)\);$", verilog, re.M | re.S)
-    if not block:
-        raise cost.CostError(f"no module {entity} in the Verilog")
-    found = re.findall(r"(input|output)\s+(?:\[(\d+):0\])?\s*(\w+)", block[1])
-    return [(d, int(w) + 1 if w else 1, n) for d, w, n in found]
+    try:
+        return [("input" if p.is_input else "output", p.bits, p.name) for p in verilog_text.ports(verilog, entity)]
+    except verilog_text.VerilogError as error:
+        raise cost.CostError(str(error)) from None
 
 
 def harness(verilog, entity):
@@ -123,7 +124,7 @@ def run_seeds(entity, generics, seeds, freq, rtl=None, jobs=1, unit=None):
         verilog, _ = cost.convert(entity, generics, rtl, work)
         top = entity
         if unit:
-            verilog, top = cost.take_unit(verilog, unit, [f[:-4] for f in cost.all_entities(rtl)])
+            verilog, top = cost.take_unit(verilog, unit, cost.read_rtl(rtl).units)
         text = verilog + harness(verilog, top)
         question = [text, DEVICE, freq, cost.tool_version(), pathlib.Path(__file__).read_text(),
                     families.fingerprint("ecp5"), (cost.HERE / "netlist.py").read_text(),

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The configurations of docs/cost.md, and the figures of others that they are compared with."""
 import pathlib
+import sys
+
+sys.path.insert(1, str(pathlib.Path(__file__).resolve().parents[1]))
+
+from psweep_tools import vhdl
 
 # Each: what is measured (entity, unit of it, configuration or generics, no_dsp), in which families flat and with the
 # hierarchy kept; tile, pixels, planes of its frame (for clocks, by the planner). 'quick': part of 'make sim'.
@@ -67,11 +72,9 @@ for _generic, _values in {**BITS, **{g: values for g, (_, values) in SIZES.items
                                               "generics": {_generic: _value}, "flat": ("xc6v",)}
 
 # Each entity with its generics as by default: the line 'cost' of its page.
-for _line in (pathlib.Path(__file__).resolve().parents[2] / "rtl" / "files.f").read_text().splitlines():
-    _entity = _line.split("#")[0].strip().removesuffix(".vhd")
-    if _entity and not _entity.endswith("_pkg"):
-        POINTS[f"entity_{_entity}"] = {"title": f"entity {_entity}, generics as by default", "entity": _entity,
-                                       "tile": None, "flat": ("xc6v",)}
+for _entity in vhdl.Rtl().entities:
+    POINTS[f"entity_{_entity}"] = {"title": f"entity {_entity}, generics as by default", "entity": _entity,
+                                   "tile": None, "flat": ("xc6v",)}
 
 # Engines that 'make pnr' places in an ECP5-85, whose multipliers have 18 x 18 bits: title, what is changed of `tile`.
 PNR = {

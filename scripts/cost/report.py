@@ -49,7 +49,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import families  # noqa: E402
 import measure as cost  # noqa: E402
 import pnr  # noqa: E402
-from points import (BITS, NG_MEDIUM, PAPER_ALL, PAPER_CLOCKS, PAPER_UNITS, PEERS, PNR, POINTS, SHIPPED,  # noqa: E402
+from points import (BITS, PAPER_ALL, PAPER_CLOCKS, PAPER_UNITS, PEERS, PNR, POINTS, SHIPPED,  # noqa: E402
                     SIZES, V5QV)
 
 OUT = cost.ROOT / "build" / "cost"

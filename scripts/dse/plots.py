@@ -98,7 +98,7 @@ for r in resources:
     below = any(abs(int(o["clocks"]) / 1e6 - x) < 30 and int(o["lut"]) > y for o in resources)
     labels += f"set label '{mbit:.1f}' at {x},{y} center offset 0,{-1.3 if below else 1.3} font ',10'\n"
 points = dict(sorted(points.items()))
-plot("pareto", "clocks, LUT and RAM of a 1120 x 1120 x 301 frame (area and number: Mbit of RAM)", labels + f"""
+plot("pareto", "clocks, LUT and RAM of a 1120 x 1120 x 301 frame (area and number: Mbit of RAM)", labels + """
 set xlabel 'million clocks'
 set ylabel 'LUT'
 set logscale y

@@ -22,7 +22,8 @@ def rewrite(top, files):
     generics = project.measure.generics_of(top, project.RTL)
     text = path.read_text()
     for pattern, lines in (
-            (r"(?:      - \w+\.vhd\n)+", ["      - {}\n".format(f.name) for f in files]),
+            (r"(?:      - [\w/]+\.vhd\n)+",
+             ["      - {}\n".format(f.relative_to(project.RTL).as_posix()) for f in files]),
             (r"(?:      - G_\w+\n)+", ["      - {}\n".format(g) for g in generics]),
             (r"(?:  G_\w+: \{.*\}\n)+", ["  {}: {{datatype: int, paramtype: generic, default: {}}}\n".format(*g)
                                          for g in generics.items()])):

@@ -13,7 +13,7 @@ for waves and would take hundreds of pads: they stay open.
   other tops     for estimates: their clocks, and for each clock one input, through a shift register to all inputs of
                  this clock, and one output, an exclusive-or of registers of all outputs (as scripts/cost/pnr.py). So
                  nothing is optimised away and no pad limits the clock; the tables count u_<top> alone
-Runs in Python 3.6 and later: the tools bring their own.
+Runs in Python 3.8 and later: the tools bring their own.
 """
 import json
 import pathlib
@@ -27,6 +27,8 @@ sys.path.insert(0, str(ROOT / "scripts" / "cost"))
 
 import measure  # noqa: E402  (generics and configurations are read in one place)
 import points  # noqa: E402
+
+from psweep_tools import vhdl  # noqa: E402
 
 CostError = measure.CostError
 RTL = ROOT / "rtl"
@@ -47,15 +49,14 @@ class FlowError(Exception):
 
 def sources(top=None):
     """Files of rtl/files.f in its order, absolute; up to and including <top>.vhd."""
-    files = measure.all_entities(RTL)
-    if top is not None:
-        if top + ".vhd" not in files:
-            raise FlowError("rtl/files.f has no {}.vhd".format(top))
-        files = files[:files.index(top + ".vhd") + 1]
-    missing = [f for f in files if not (RTL / f).is_file()]
+    try:
+        files = measure.read_rtl(RTL).sources(top)
+    except vhdl.VhdlError as error:
+        raise FlowError(str(error)) from None
+    missing = [path.name for path in files if not path.is_file()]
     if missing:
         raise FlowError("rtl/files.f: missing " + " ".join(missing))
-    return [RTL / f for f in files]
+    return files
 
 
 def boards(tool=None):
@@ -76,19 +77,12 @@ def board(name, tool):
 
 def ports_of(entity):
     """[(name, 'in' or 'out', type)] of an entity, from its declaration."""
-    text = re.sub(r"--.*", "", (RTL / (entity + ".vhd")).read_text())
-    block = re.search(r"entity {} is(.*?)end entity".format(entity), text, re.S | re.I)
-    start = re.search(r"\bport\s*\(", block[1]) if block else None
-    if not start:
-        raise FlowError("rtl/{0}.vhd declares no entity {0} with ports".format(entity))
-    body = block[1][start.end():block[1].rindex(")")]
-    found = []
-    for declaration in body.split(";"):
-        match = re.match(r"\s*([\w\s,]+?)\s*:\s*(in|out)\s+(.*?)\s*\Z", declaration, re.S)
-        if not match:
-            raise FlowError("rtl/{}.vhd: port not understood: {}".format(entity, declaration.strip()))
-        for name in re.split(r"\s*,\s*", match[1]):
-            found.append((name, match[2], re.sub(r"\s+", " ", match[3])))
+    try:
+        found = [(port.name, port.mode, port.type) for port in measure.read_rtl(RTL).entity(entity).ports]
+    except vhdl.VhdlError as error:
+        raise FlowError(str(error)) from None
+    if not found:
+        raise FlowError("entity {} has no ports".format(entity))
     return found
 
 
@@ -268,10 +262,8 @@ def clock_of(top, port):
 
 def instances():
     """{entity: {'u_engine': 'psweep', ..}}: labels of the instances in each entity, to find units in reports."""
-    found = {}
-    for path in sources():
-        text = re.sub(r"--.*", "", path.read_text())
-        found[path.stem] = dict(re.findall(r"\b(u_\w+)\s*:\s*entity\s+work\.(\w+)", text))
+    rtl = measure.read_rtl(RTL)
+    found = {unit: {i.label: i.entity for i in rtl.design(unit).instances} for unit in rtl.units}
     for top in TOPS:
         found[top + "_pins"] = {"u_" + top: top}
     return found

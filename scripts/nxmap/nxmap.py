@@ -88,7 +88,7 @@ def build(nx, job, out, synthesise_only):
     project.addParameters({name: str(value) for name, value in job["generics"].items()})
     project.setOptions(OPTIONS)
     for entity, kind, target in MAPPING:
-        if str(flow.RTL / (entity + ".vhd")) in job["files"]:
+        if str(flow.measure.read_rtl(flow.RTL).path(entity)) in job["files"]:
             project.addMappingDirective(nx.getModels("*" + entity + "*"), kind, target)
     if job["banks"]:
         project.addBanks(job["banks"])

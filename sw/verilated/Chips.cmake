@@ -34,7 +34,8 @@ foreach(CHIP_NAME IN LISTS chips)
   string(APPEND REGISTRY_DECLARATIONS
          "net::ArbiterConfig config_of_${CHIP_NAME}();\nstd::unique_ptr<ChipModel> make_${CHIP_NAME}();\n")
   list(APPEND entries "      {\"${CHIP_NAME}\", R\"(${description})\",\n"
-       "       \"${engine}\", config_of_${CHIP_NAME}(), net::address_of(config_of_${CHIP_NAME}()), ${has_waves}, &make_${CHIP_NAME}},\n")
+       "       \"${engine}\", config_of_${CHIP_NAME}(), net::address_of(config_of_${CHIP_NAME}()), ${has_waves}, "
+       "&make_${CHIP_NAME}},\n")
 endforeach()
 list(JOIN entries "" REGISTRY_ENTRIES)
 configure_file(chip_registry.cpp.in ${CMAKE_CURRENT_BINARY_DIR}/chip_registry.cpp @ONLY)

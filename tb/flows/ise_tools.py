@@ -14,6 +14,11 @@ import pathlib
 import re
 import sys
 
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
+
+from psweep_tools import vhdl  # noqa: E402
+
 YES = {"yes", "no"}
 # Run-script options of xst and their values; None: anything.
 XST = {
@@ -92,19 +97,20 @@ def synthesise(found):
             refuse("xst", "no -" + name)
     if not re.match(PART, options["p"]):
         refuse("xst", "part " + options["p"])
-    entities, text = {}, ""
+    entities = {}
     for line in pathlib.Path(options["ifn"]).read_text().splitlines():
         match = re.match(r'vhdl work "(.+)"\Z', line)
         if not match or not pathlib.Path(match[1]).is_file():
             refuse("xst", "project: " + line)
-        text = re.sub("--.*", "", pathlib.Path(match[1]).read_text())
-        for used in re.findall(r"\bentity\s+work\.(\w+)", text):
-            if used not in entities and not re.search(r"\bentity {} is".format(used), text):
-                refuse("xst", "{} uses {} before it is analysed".format(match[1], used))
-        entities.update({name: text for name in re.findall(r"^entity (\w+) is", text, re.M)})
+        design = vhdl.parse(pathlib.Path(match[1]).read_text())
+        declared = {entity.name: entity for entity in design.entities}
+        for instance in design.instances:
+            if instance.entity not in entities and instance.entity not in declared:
+                refuse("xst", "{} uses {} before it is analysed".format(match[1], instance.entity))
+        entities.update(declared)
     if options["top"] not in entities:
         refuse("xst", "no entity " + options["top"])
-    known = re.findall(r"\b(G_\w+)\s*:", entities[options["top"]].split("port (")[0])
+    known = [generic.name for generic in entities[options["top"]].generics]
     generics = options.get("generics", "{}")
     if not re.match(r"\{(\w+=-?\d+( |(?=\})))*\}\Z", generics):
         refuse("xst", "-generics " + generics)

@@ -10,6 +10,12 @@ import json
 import os
 import pathlib
 import re
+import sys
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
+
+from psweep_tools import vhdl  # noqa: E402
 
 YES = {"Yes", "No"}
 EFFORT = {"Low", "Medium", "High"}
@@ -96,16 +102,17 @@ class Project(object):
     def addFiles(self, library, files):
         for file in files:
             need(os.path.isfile(file), "no source " + file)
-            text = re.sub("--.*", "", pathlib.Path(file).read_text())
-            for used in re.findall(r"\bentity\s+work\.(\w+)", text):
-                need(used in self.entities or re.search(r"\bentity {} is".format(used), text),
-                     "{} uses {} before it is there".format(file, used))
-            self.entities.update({name: text for name in re.findall(r"^entity (\w+) is", text, re.M)})
+            design = vhdl.parse(pathlib.Path(file).read_text())
+            declared = {entity.name: entity for entity in design.entities}
+            for instance in design.instances:
+                need(instance.entity in self.entities or instance.entity in declared,
+                     "{} uses {} before it is there".format(file, instance.entity))
+            self.entities.update(declared)
         record("addFiles", [library, files])
 
     def addParameters(self, parameters):
         need(self.top in self.entities, "no entity {}".format(self.top))
-        known = re.findall(r"\b(G_\w+)\s*:", self.entities[self.top].split("port (")[0])
+        known = [generic.name for generic in self.entities[self.top].generics]
         for name, value in parameters.items():
             need(name in known, "no generic " + name)
             need(isinstance(value, str) and re.match(r"-?\d+\Z", value), "{}={!r}".format(name, value))
@@ -126,13 +133,10 @@ class Project(object):
 
     # --- pads ---
     def ports(self):
-        text = self.entities[self.top]
-        text = text[text.index("port ("):text.index("end entity")]
         found = {}
-        for name, direction, high in re.findall(
-                r"(\w+)\s*:\s*(in|out)\s+std_logic(?:_vector\((\d+) downto 0\))?", text):
-            for bit in ["[{}]".format(i) for i in range(int(high) + 1)] if high else [""]:
-                found[name + bit] = direction
+        for port in self.entities[self.top].ports:
+            for bit in ["[{}]".format(i) for i in range(int(vhdl.width_of(port)))] if port.range else [""]:
+                found[port.name + bit] = port.mode
         return found
 
     def addBanks(self, banks):

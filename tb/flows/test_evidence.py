@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of scripts/evidence and scripts/mutants. Nothing is built or measured."""
+"""Tests of evidence and mutants. Nothing is built or measured."""
 import json
 import pathlib
 import sys
@@ -9,8 +9,9 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from evidence import figures, manifest, pages, parsers, records, sources, tables  # noqa: E402
-from mutants import campaign, chains, faults  # noqa: E402
+from psweep_tools.evidence import figures, manifest, pages, parsers, records, sources, tables  # noqa: E402
+from psweep_tools.mutants import campaign, chains, faults  # noqa: E402
+from psweep_tools.vhdl import Rtl  # noqa: E402
 
 
 class Hashes(unittest.TestCase):
@@ -27,12 +28,16 @@ class Hashes(unittest.TestCase):
         self.assertFalse(same("a.sh", "a # b\n", "a\n"))
 
     def test_globs(self) -> None:
-        names = ["rtl/a.vhd", "rtl/psweep.vhd", "rtl/c.vhd", "tb/x/t.cpp", "tb/x/y/u.cpp", "tb/x/test_v.cpp"]
-        files_f = "a.vhd\npsweep.vhd\nc.vhd\n"
-        self.assertEqual(sources.expand(["@engine"], names, files_f), ["rtl/a.vhd", "rtl/psweep.vhd"])
+        names = ["rtl/x/a.vhd", "rtl/y/psweep.vhd", "rtl/c.vhd", "tb/x/t.cpp", "tb/x/y/u.cpp", "tb/x/test_v.cpp"]
+        files_f = "x/a.vhd\ny/psweep.vhd\nc.vhd\n"
+        self.assertEqual(sources.expand(["@engine"], names, files_f), ["rtl/x/a.vhd", "rtl/y/psweep.vhd"])
         self.assertEqual(len(sources.expand(["@chip"], names, files_f)), 3)
         self.assertEqual(sources.expand(["tb/x/**", "!tb/x/test_*"], names, files_f), ["tb/x/t.cpp", "tb/x/y/u.cpp"])
         self.assertEqual(sources.expand(["tb/x/*.cpp"], names, files_f), ["tb/x/t.cpp", "tb/x/test_v.cpp"])
+
+    def test_moved_vhdl_is_the_same(self) -> None:
+        self.assertEqual([sources.known_as(n) for n in ("rtl/x/a.vhd", "rtl/a.vhd", "rtl/configs/engine/tiny.json")],
+                         ["rtl/a.vhd", "rtl/a.vhd", "rtl/configs/engine/tiny.json"])
 
     def test_closures(self) -> None:
         text = {"p": "package p", "a": "use work.p.all; -- b", "b": "u : entity work.a"}.__getitem__
@@ -137,8 +142,8 @@ class Pages(unittest.TestCase):
         self.assertIn("block 'mutants' is in no page", wrong)
 
     def test_tables_by_hand_name_their_commit(self) -> None:
-        (self.root / "scripts" / "evidence").mkdir(parents=True)
         waivers = self.root / figures.WAIVERS
+        waivers.parent.mkdir(parents=True)
         waivers.write_text("")
         table = "| a | LUT | FF |\n|---|---|---|\n" + "| x | 12 | 34 |\n" * 3
         self.page.write_text("# A\n" + table)
@@ -298,9 +303,9 @@ class Draw(unittest.TestCase):
 
     def test_density(self) -> None:
         self.assertEqual([faults.quota(n) for n in (41, 150, 201, 958)], [2, 3, 10, 19])
-        for path in (ROOT / "rtl").glob("*.vhd"):
-            text = path.read_bytes().decode("latin-1").split("\n")
-            self.assertGreaterEqual(len(faults.candidates(path.stem, text, 1)), 2, path.stem)
+        rtl = Rtl()
+        for unit in rtl.units:
+            self.assertGreaterEqual(len(faults.candidates(unit, rtl.text(unit).split("\n"), 1)), 2, unit)
 
     def test_every_entity_has_tests(self) -> None:
         names = [str(p.relative_to(ROOT)) for f in ("rtl", "tb", "sw") for p in (ROOT / f).rglob("*") if p.is_file()]

@@ -8,7 +8,8 @@ string(REPLACE "|" ";" SOURCES "${SOURCES}")
 file(REMOVE_RECURSE ${DIR})
 file(MAKE_DIRECTORY ${DIR})
 edited_sources(analysed ${DIR}
-               "-- synthesis translate_off[ \n]*:= [(]others => [(][^\n]*[ \n]*-- synthesis translate_on" "" ${SOURCES})
+               "-- synthesis translate_off[ \n]*:= [(]others => [(][^\n]*[ \n]*-- synthesis translate_on" ""
+               "signal memory :" ${SOURCES})
 execute_process(COMMAND ${GHDL} -a ${STANDARD} --workdir=${DIR} ${analysed} ${BENCH} RESULT_VARIABLE code
                 ERROR_VARIABLE log)
 if(NOT code EQUAL 0)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Recording: writes what a circuit was driven with and what it showed, for a bench in any simulator (docs/replay.md,
-// format; tb/replay/ports.pl makes the benches). Names, order and widths of the ports are those of the entity: clocks,
-// other inputs, outputs. Each step: set() and expect() as far as values change, then step().
+// format; scripts/tools.py ports makes the benches). Names, order and widths of the ports are those of the entity:
+// clocks, other inputs, outputs. Each step: set() and expect() as far as values change, then step().
 #pragma once
 #include <cstdint>
 #include <fstream>

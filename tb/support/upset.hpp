@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A register of an entity that tb/units/upset.pl has made one that can be upset; <model>.inc lists them, flip_site 1
-// being the first.
+// A register of an entity that scripts/tools.py upsets has made one that can be upset; <model>.inc lists them,
+// flip_site 1 being the first.
 #pragma once
 
 namespace psweep::tb {

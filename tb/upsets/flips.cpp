@@ -2,7 +2,7 @@
 // flips [--short] [--all] [--seed N] [--only CONFIGURATION:SITE:BIT:CLOCK:WORD[:refused]]: single-event upsets in the
 // engine. One bit of one register, or of one word of a RAM, is changed in one clock of a tile, and the bench goes on as
 // a host would: it waits for the tile, looks at errors, counters and the number of cells, aborts if something is wrong
-// or nothing ends, and sends the next tiles. inject.pl makes the circuit that can be changed.
+// or nothing ends, and sends the next tiles. scripts/tools.py upsets makes the circuit that can be changed.
 //   hang       the engine was busy longer than the largest tile of the build takes, though all streams moved
 //   masked     map and status are as without the upset
 //   detected   an error bit, a dropped tile, or a wrong number of cells; or error 'upset' of the next tile, of an upset
@@ -185,12 +185,7 @@ class Campaign {
  public:
   Campaign(const std::string& name, const std::vector<Site>& sites, std::unique_ptr<Machine> machine,
            const golden::Config& config, const Options& options)
-      : name_(name),
-        lanes_(config.lanes),
-        sites_(sites),
-        machine_(std::move(machine)),
-        options_(options),
-        maker_(config, options.seed) {
+      : name_(name), sites_(sites), machine_(std::move(machine)), options_(options), maker_(config, options.seed) {
     // Small tiles, so that many upsets can be tried: what control does is the same.
     const int planes = std::min(config.planes, 2 * config.lanes + 1);
     tile_ = maker_.make(scene::Texture::kStereo, scene::Geometry::kInside, 5, 4, planes);
@@ -217,11 +212,11 @@ class Campaign {
       return false;
     }
     if (!options_.only.empty()) return one();
-    // Sites are found by name: one that is not found must not just be left out. (Of a RAM per lane none is found.)
+    // Sites are found by name: one that is not found must not just be left out.
     for (const char* name : {"u_map.memory", "u_table.memory", "u_offsets.memory"}) {
       const bool found =
           std::any_of(sites_.begin(), sites_.end(), [&](const Site& s) { return s.name == std::string(name); });
-      if (found || (lanes_ > 1 && std::string(name) != "u_map.memory")) continue;
+      if (found) continue;
       std::printf("flips: %s: there is no %s to be upset\n", name_.c_str(), name);
       return false;
     }
@@ -395,7 +390,6 @@ class Campaign {
   }
 
   std::string name_;
-  int lanes_;
   const std::vector<Site>& sites_;
   std::unique_ptr<Machine> machine_;
   Options options_;

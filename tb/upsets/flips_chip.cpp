@@ -2,7 +2,7 @@
 // flips_chip [--short] [--seed N] [--count N] [--part K/N] [--only SITE:BIT:CLOCK] [--sites]: single-event upsets in
 // the whole chip while tiles run over its link. One bit of one register is changed at one edge of its clock; a host
 // that does what docs/host.md says goes on: repeats what is not answered, opens its session again when it is lost or
-// nothing moves, and sends a tile again that has failed. inject_chip.py makes the circuit that can be changed.
+// nothing moves, and sends a tile again that has failed. scripts/tools.py upsets makes the circuit that can be changed.
 //   masked     both maps are right in the first session; perhaps a message had to be repeated
 //   repeated   the chip said that the tile had failed or that there were errors; sent again, both maps are right
 //   session    the session was lost, or nothing moved and the host opened it again; both maps are right

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other simulators and machines: netlists, kernel, cocotb, a bare Debian."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Circuits whose registers can be upset (docs/robustness.md)."""
