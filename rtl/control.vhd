@@ -339,12 +339,12 @@ begin
            & " outside 1..125"
     severity failure;
 
-  is_idle   <= to_bit(state_q = C_IDLE);
-  is_load   <= to_bit(state_q = C_LOAD);
-  is_sweep  <= to_bit(state_q = C_SWEEP);
-  is_flush  <= to_bit(state_q = C_FLUSHING);
-  is_unload <= to_bit(state_q = C_UNLOAD);
-  is_drain  <= to_bit(state_q = C_DRAIN);
+  is_idle   <= to_sl(state_q = C_IDLE);
+  is_load   <= to_sl(state_q = C_LOAD);
+  is_sweep  <= to_sl(state_q = C_SWEEP);
+  is_flush  <= to_sl(state_q = C_FLUSHING);
+  is_unload <= to_sl(state_q = C_UNLOAD);
+  is_drain  <= to_sl(state_q = C_DRAIN);
 
   -- Register writes --------------------------------------------------------------------------------------------------
   -- In a register first, with what the address alone tells: checks and state come behind it.
@@ -357,14 +357,14 @@ begin
       if s_cfg_tvalid = '0' then
         cfg_word(2 downto 0) <= "000"; -- an upset alone, of these or of cfg_command, commands nothing
       end if;
-      cfg_command  <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
-      cfg_low      <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 37)) = 0)
-                      and to_bit(unsigned(s_cfg_tdata(36 downto 32)) /= C_COMMAND);
-      cfg_middle   <= s_cfg_tvalid and not s_cfg_tdata(47) and to_bit(unsigned(s_cfg_tdata(46 downto 37)) /= 0);
+      cfg_command  <= s_cfg_tvalid and to_sl(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
+      cfg_low      <= s_cfg_tvalid and to_sl(unsigned(s_cfg_tdata(47 downto 37)) = 0)
+                      and to_sl(unsigned(s_cfg_tdata(36 downto 32)) /= C_COMMAND);
+      cfg_middle   <= s_cfg_tvalid and not s_cfg_tdata(47) and to_sl(unsigned(s_cfg_tdata(46 downto 37)) /= 0);
       cfg_high     <= s_cfg_tvalid and s_cfg_tdata(47);
-      cfg_in_table <= to_bit(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS);
-      cfg_fits     <= to_bit(unsigned(s_cfg_tdata(31 downto 16)) = 0);
-      cfg_some     <= to_bit(unsigned(s_cfg_tdata(15 downto 0)) /= 0);
+      cfg_in_table <= to_sl(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS);
+      cfg_fits     <= to_sl(unsigned(s_cfg_tdata(31 downto 16)) = 0);
+      cfg_some     <= to_sl(unsigned(s_cfg_tdata(15 downto 0)) /= 0);
       if rst = '1' then
         cfg_command <= '0';
         cfg_low     <= '0';
@@ -386,15 +386,15 @@ begin
                    else to_unsigned(G_IMG_ROWS, 16) when cfg_index(2 downto 0) = C_WIN_ROWS
                    else to_unsigned(G_PLANES, 16) when cfg_index(2 downto 0) = C_PLANES
                    else to_unsigned(2 ** G_MNCC_W - 1, 16);
-  cfg_in_range  <= cfg_fits and (cfg_some or to_bit(cfg_index(2 downto 0) = C_THRESHOLD))
-                   and to_bit(cfg_value <= cfg_limit);
+  cfg_in_range  <= cfg_fits and (cfg_some or to_sl(cfg_index(2 downto 0) = C_THRESHOLD))
+                   and to_sl(cfg_value <= cfg_limit);
   command_clear <= cfg_command and cfg_word(2);
   command_abort <= cfg_command and cfg_word(1);
   command_start <= cfg_command and cfg_word(0) and not cfg_word(1);
 
-  table_next  <= to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) = table_words);
+  table_next  <= to_sl(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) = table_words);
   table_ok    <= cfg_in_table
-                 and to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) <= table_words);
+                 and to_sl(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) <= table_words);
 
   -- A register more, as the table's blocks lie far apart. The first row is read long after the last write.
   p_table : process (clk)
@@ -409,7 +409,7 @@ begin
       cfg_parity  <= v_odd;
       table_we    <= cfg_table and table_ok;
       table_addr  <= cfg_word(C_TABLE_W + 31 downto 32);
-      offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
+      offset_we   <= cfg_register and to_sl(cfg_index(4 downto 2) = C_OFFSETS / 4);
       offset_addr <= cfg_word(33 downto 32);
       if rst = '1' then
         table_we  <= '0';
@@ -420,13 +420,13 @@ begin
 
   event_busy    <= not is_idle and (cfg_low or cfg_middle or cfg_high or command_start);
   event_address <= (cfg_table and not table_ok)
-                   or (cfg_register and to_bit(cfg_index = 7))
-                   or (cfg_register and to_bit(cfg_index >= 12 and cfg_index < C_LEFT))
-                   or (cfg_register and to_bit(cfg_index >= C_RIGHT + 4))
+                   or (cfg_register and to_sl(cfg_index = 7))
+                   or (cfg_register and to_sl(cfg_index >= 12 and cfg_index < C_LEFT))
+                   or (cfg_register and to_sl(cfg_index >= C_RIGHT + 4))
                    or (cfg_middle and is_idle);
 
   config_bad   <= not (tile_cols_ok and tile_rows_ok and win_cols_ok and win_rows_ok and planes_ok and threshold_ok);
-  table_bad    <= to_bit(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
+  table_bad    <= to_sl(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
   event_config <= command_start and is_idle and config_bad;
   event_table  <= command_start and is_idle and not config_bad and table_bad;
   start_ok     <= command_start and is_idle and not config_bad and not table_bad;
@@ -504,14 +504,14 @@ begin
   lanes(0) <= '1';
 
   g_mask : for n in 1 to G_LANES - 1 generate
-    lanes(n) <= not at_set_end or to_bit(last_wide(1 downto 0) >= n) when G_LANES = 4
+    lanes(n) <= not at_set_end or to_sl(last_wide(1 downto 0) >= n) when G_LANES = 4
                 else not at_set_end or last_wide(0);
   end generate g_mask;
 
   -- Only windows below C_ROW_MIN can have rows that need padding.
   g_padding : if G_WINDOW < C_ROW_MIN generate
     row_last_col <= sweep_last_col when sweep_last_col >= C_ROW_MIN - 1 else to_unsigned(C_ROW_MIN - 1, C_COL_W);
-    at_row_last <= to_bit(col = sweep_last_col);
+    at_row_last <= to_sl(col = sweep_last_col);
   end generate g_padding;
 
   g_no_padding : if G_WINDOW >= C_ROW_MIN generate
@@ -530,21 +530,21 @@ begin
   last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
   last_set    <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
   -- 'Not below' and the second comparison are for an upset bit: no tile sweeps more sets than the table has.
-  at_set_end  <= to_bit(plane_set >= last_set or plane_set = C_SETS - 1);
+  at_set_end  <= to_sl(plane_set >= last_set or plane_set = C_SETS - 1);
   at_tile_end <= is_sweep and at_last and at_set_end_q;
   step        <= pix_fire or is_sweep;
   load_done   <= pix_fire and at_last and s_pix_tlast;
   event_short <= pix_fire and s_pix_tlast and not at_last;
   event_long  <= pix_fire and at_last and not s_pix_tlast;
   sample_last <= active and at_row_end and at_row_last;
-  flushed     <= is_flush and to_bit(since_last = C_FLUSH);
+  flushed     <= is_flush and to_sl(since_last = C_FLUSH);
   tile_done   <= is_unload and map_last and not map_more;
   -- What cannot be unless a bit was upset: a state without a name, a map that ends before or after its last beat, or a
   -- word of table or offsets with wrong parity (beside a sweep, one of a tile that was dropped).
   upset_now   <= not (is_idle or is_load or is_sweep or is_flush or is_unload or is_drain)
                  or (is_unload and not map_more and not map_valid)
                  or (map_last and map_more and not abort_q) -- (a beat that an abort takes away is none)
-                 or ((is_sweep or is_flush) and to_bit(unsigned(word_error) /= 0));
+                 or ((is_sweep or is_flush) and to_sl(unsigned(word_error) /= 0));
   halt        <= command_abort or event_upset;
   -- Apart from where to, so that no chain of states lies before the register's enable.
   move        <= (is_idle and command_start)
@@ -602,11 +602,11 @@ begin
             at_row_end <= '0'; -- of a plane to come: it has at least three rows
           else
             row        <= row + 1;
-            at_row_end <= to_bit(row = last_row_less_1);
+            at_row_end <= to_sl(row = last_row_less_1);
           end if;
         else
           col        <= col + 1;
-          at_col_end <= to_bit(col = last_col_less_1);
+          at_col_end <= to_sl(col = last_col_less_1);
         end if;
       end if;
       -- Limits of load are set up in idle, those of the sweep, which has at least three rows, when load is over.
@@ -615,9 +615,9 @@ begin
         last_row_less_1 <= next_last_row - 1;
       end if;
       if is_idle = '1' then
-        one_col    <= to_bit(win_last_col_q = 0);
-        at_col_end <= to_bit(win_last_col_q = 0);
-        at_row_end <= to_bit(win_last_row_q = 0);
+        one_col    <= to_sl(win_last_col_q = 0);
+        at_col_end <= to_sl(win_last_col_q = 0);
+        at_row_end <= to_sl(win_last_row_q = 0);
       elsif load_done = '1' then
         one_col    <= '0';
       end if;
@@ -709,7 +709,7 @@ begin
       v_odd  := '0';
       v_one  := '0';
       v_two  := '0';
-      v_four := to_bit(G_LANES = 4);
+      v_four := to_sl(G_LANES = 4);
       for n in 0 to G_LANES - 1 loop
         v_odd  := v_odd xor window_error(n);
         v_two  := v_two or (v_one and window_error(n));
@@ -723,7 +723,7 @@ begin
     end if;
   end process p_window;
 
-  sample_lost        <= to_bit(samples_lost /= 0);
+  sample_lost        <= to_sl(samples_lost /= 0);
   window_errors_next <= ('0' & window_errors_q) + samples_lost;
   event_window     <= sample_lost and not window_seen;
   cfg_event        <= event_config or event_table or event_address or event_busy;

@@ -105,12 +105,12 @@ begin
   room     <= not valid or m_ready;
   stop     <= in_frame and (ended or not dv);
   byte_end <= in_frame and not stop and high;
-  full     <= to_bit(count = C_MAX);
-  crc_good <= to_bit(crc = C_CRC_RESIDUE);
+  full     <= to_sl(count = C_MAX);
+  crc_good <= to_sl(crc = C_CRC_RESIDUE);
 
   -- The register has seen an odd nibble too, so what it said before that one was kept.
   wrong   <= not crc_good when high = '0' else not was_good;
-  verdict <= lost & error & long & to_bit(count(10 downto 6) = 0) & (high and wrong) & wrong;
+  verdict <= lost & error & long & to_sl(count(10 downto 6) = 0) & (high and wrong) & wrong;
 
   p_frame : process (clk)
   begin
@@ -124,7 +124,7 @@ begin
         valid <= '0';
       end if;
 
-      after_5 <= dv and to_bit(nibble = "0101");
+      after_5 <= dv and to_sl(nibble = "0101");
       if hunting = '1' and dv = '1' and (own = '1' or (after_5 = '1' and nibble = "1101")) then
         hunting  <= '0';
         in_frame <= not own;

@@ -204,7 +204,7 @@ architecture rtl of packet_rx is
   -- Frame byte n, as place.
   function at_byte (code : unsigned; n : natural) return std_logic is
   begin
-    return to_bit(code = to_unsigned((n + 64 - C_HEADER) mod 64, 6));
+    return to_sl(code = to_unsigned((n + 64 - C_HEADER) mod 64, 6));
   end function at_byte;
 
 begin
@@ -259,11 +259,11 @@ begin
 
   -- Places of addresses: MAC 30 to 35 and 36 to 41, ARP 52 to 57; IP 56 to 63, ARP 58 to 61 and 4 to 7.
   sender <= place(5) and (place(4) or place(3) or place(2));
-  in_mac <= to_bit(place(5 downto 1) = 15 or place(5 downto 2) = 8 or place(5 downto 2) = 9 or
+  in_mac <= to_sl(place(5 downto 1) = 15 or place(5 downto 2) = 8 or place(5 downto 2) = 9 or
                    place(5 downto 1) = 20) or
-            (arp and to_bit(place(5 downto 2) = 13 or place(5 downto 1) = 28));
-  in_ip  <= to_bit(place(5 downto 1) = 29 or place(5 downto 1) = 30) or
-            (not arp and to_bit(place(5 downto 3) = 7)) or (arp and to_bit(place(5 downto 2) = 1));
+            (arp and to_sl(place(5 downto 2) = 13 or place(5 downto 1) = 28));
+  in_ip  <= to_sl(place(5 downto 1) = 29 or place(5 downto 1) = 30) or
+            (not arp and to_sl(place(5 downto 3) = 7)) or (arp and to_sl(place(5 downto 2) = 1));
   mac_at <= (place(2 downto 1) + unsigned'('0' & sender)) & place(0);
   ip_at  <= (place(1) xor (arp and place(5))) & place(0);
 
@@ -355,16 +355,16 @@ begin
       want    <= want_next;
 
       near_q       <= near;
-      of_mac       <= to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
+      of_mac       <= to_sl(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
       of_type      <= at_byte(place, 12) or at_byte(place, 13) or
-                      (arp and (to_bit(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
-                                to_bit(place(5 downto 2) = "0001")));
-      of_head      <= at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111");
+                      (arp and (to_sl(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
+                                to_sl(place(5 downto 2) = "0001")));
+      of_head      <= at_byte(place, 14) or at_byte(place, 16) or to_sl(place(5 downto 2) = "1111");
       of_fragment  <= at_byte(place, 20) or at_byte(place, 21);
-      of_kind      <= at_byte(place, 23) or (icmp and to_bit(place(5 downto 1) = "00000"));
-      of_port      <= udp and to_bit(place(5 downto 1) = "00001");
-      of_length    <= udp and to_bit(place(5 downto 1) = "00010");
-      of_checksum  <= udp and to_bit(place(5 downto 1) = "00011");
+      of_kind      <= at_byte(place, 23) or (icmp and to_sl(place(5 downto 1) = "00000"));
+      of_port      <= udp and to_sl(place(5 downto 1) = "00001");
+      of_length    <= udp and to_sl(place(5 downto 1) = "00010");
+      of_checksum  <= udp and to_sl(place(5 downto 1) = "00011");
       only_low     <= at_byte(place, 20) and not arp;
       only_high    <= at_byte(place, 16) and not arp;
       takes_length <= near and at_byte(place, 17);
@@ -375,27 +375,27 @@ begin
       of_last      <= at_byte(place, 11) or (arp and (at_byte(place, 27) or at_byte(place, 31))) or
                       (at_byte(place, 29) and not arp);
 
-      add_head   <= header and to_bit(place >= 44);
-      add_body   <= not near or to_bit(place = 46 or place = 47 or place >= 56 or place < 8);
-      add_minus3 <= (others => near and to_bit(place = 48 or place = 49));
+      add_head   <= header and to_sl(place >= 44);
+      add_body   <= not near or to_sl(place = 46 or place = 47 or place >= 56 or place < 8);
+      add_minus3 <= (others => near and to_sl(place = 48 or place = 49));
       if place(0) = '1' then
         add_minus3(0) <= '0';
       end if;
-      restart <= near and icmp and to_bit(place = 63);
+      restart <= near and icmp and to_sl(place = 63);
     end if;
   end process p_byte;
 
-  differs <= to_bit((data(7 downto 6) /= want(7 downto 6) and only_low = '0') or data(5 downto 3) /= want(5 downto 3) or
+  differs <= to_sl((data(7 downto 6) /= want(7 downto 6) and only_low = '0') or data(5 downto 3) /= want(5 downto 3) or
                     (data(2 downto 0) /= want(2 downto 0) and only_high = '0'));
 
-  bad_net <= to_bit(data(7 downto 5) = "111" or data = x"00" or data = x"7f");
+  bad_net <= to_sl(data(7 downto 5) = "111" or data = x"00" or data = x"7f");
 
   p_wrong : process (clk)
   begin
     if rising_edge(clk) then
       if got = '1' and near_q = '1' then
         not_mine     <= not_mine or (of_mac and differs);
-        not_all      <= not_all or (of_mac and to_bit(data /= x"ff"));
+        not_all      <= not_all or (of_mac and to_sl(data /= x"ff"));
         bad_type     <= bad_type or (of_type and differs);
         bad_head     <= bad_head or (of_head and differs);
         bad_fragment <= bad_fragment or (of_fragment and differs);
@@ -480,9 +480,9 @@ begin
   end process p_sums;
 
   -- Judgement ---------------------------------------------------------------------------------------------------------
-  ip_bad  <= to_bit(length(10 downto 3) = 0) or not behind(4) or
-             (not arp and (bad_head or to_bit(head_sum /= x"ffff")));
-  sum_bad <= bad_length or (to_bit(body_sum /= x"ffff") and (icmp or has_checksum));
+  ip_bad  <= to_sl(length(10 downto 3) = 0) or not behind(4) or
+             (not arp and (bad_head or to_sl(head_sum /= x"ffff")));
+  sum_bad <= bad_length or (to_sl(body_sum /= x"ffff") and (icmp or has_checksum));
 
   p_outcome : process (data, half_duplex, not_mine, not_all, bad_type, ip_bad, bad_source, arp, icmp, bad_fragment,
                        bad_kind, sum_bad, closed, room)
@@ -544,14 +544,14 @@ begin
 
   -- Ring --------------------------------------------------------------------------------------------------------------
   store    <= fire and not s_last;
-  crossing <= store and to_bit(pos(8 downto 0) = C_FIRST(8 downto 0));
+  crossing <= store and to_sl(pos(8 downto 0) = C_FIRST(8 downto 0));
   used     <= write_head - read_head;
-  broken   <= used(C_RING_W) and to_bit(used(C_RING_W - 1 downto 0) /= 0);
+  broken   <= used(C_RING_W) and to_sl(used(C_RING_W - 1 downto 0) /= 0);
   room_now <= not full and (near or room) when crossing = '1' else -- near: the first granule
               room;
 
   taken_now <= "00" when near = '1' else taken;
-  full      <= used(C_RING_W) or (to_bit(used(C_RING_W - 1 downto 1) = C_RING_END) and
+  full      <= used(C_RING_W) or (to_sl(used(C_RING_W - 1 downto 1) = C_RING_END) and
                                   (taken_now(1) or (taken_now(0) and used(0))));
 
   p_ring : process (clk)
@@ -568,7 +568,7 @@ begin
         read_head <= read_head + unsigned(info_read(14 downto 13));
       end if;
       -- info_read follows read_head by one clock.
-      shown <= to_bit(used /= 0) and not m_done;
+      shown <= to_sl(used /= 0) and not m_done;
       if rst = '1' or broken = '1' or stale = '1' then
         room       <= '0';
         write_head <= (others => '0');

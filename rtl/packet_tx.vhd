@@ -166,15 +166,15 @@ begin
   icmp    <= kind(0);
   take    <= paying and p_valid;
   p_ready <= paying;
-  last    <= to_bit(place = 41) or (icmp and to_bit(place = 37)); -- the ICMP payload begins at 38
-  finish  <= last and to_bit(round = 3);
+  last    <= to_sl(place = 41) or (icmp and to_sl(place = 37)); -- the ICMP payload begins at 38
+  finish  <= last and to_sl(round = 3);
 
   p_control : process (clk)
   begin
     if rising_edge(clk) then
-      turning <= (s_start and to_bit(s_kind = "00")) or (take and p_last);
+      turning <= (s_start and to_sl(s_kind = "00")) or (take and p_last);
       if s_start = '1' then
-        paying <= to_bit(s_kind /= "00");
+        paying <= to_sl(s_kind /= "00");
         kind   <= s_kind;
         bank   <= s_bank;
         size   <= to_unsigned(42, 11);
@@ -326,30 +326,30 @@ begin
 
   -- Round 1 writes the checksum of UDP or ICMP, round 3 that of IP.
   at_checksum <= round(0) and not arp and
-                 ((round(1) and to_bit(place(5 downto 1) = 12)) or
-                  (not round(1) and ((udp and to_bit(place(5 downto 1) = 20)) or
-                                     (not udp and to_bit(place(5 downto 1) = 18)))));
+                 ((round(1) and to_sl(place(5 downto 1) = 12)) or
+                  (not round(1) and ((udp and to_sl(place(5 downto 1) = 20)) or
+                                     (not udp and to_sl(place(5 downto 1) = 18)))));
 
   p_way : process (clk)
   begin
     if rising_edge(clk) then
       way_step     <= walking and not rst;
-      way_we       <= walking and not rst and (to_bit(round = 0) or at_checksum);
+      way_we       <= walking and not rst and (to_sl(round = 0) or at_checksum);
       way_place    <= place;
       way_checksum <= at_checksum;
       way_no_zero  <= not round(1);
-      way_clear    <= walking and to_bit(round = 2 and place = 0);
+      way_clear    <= walking and to_sl(round = 2 and place = 0);
       if round = 0 then
-        way_add <= (udp and to_bit(place >= 14 and place <= 39)) or
-                   (kind(1) and kind(0) and to_bit(place(5 downto 1) = 17));
+        way_add <= (udp and to_sl(place >= 14 and place <= 39)) or
+                   (kind(1) and kind(0) and to_sl(place(5 downto 1) = 17));
       else
-        way_add <= to_bit(round = 2 and place >= 14 and place <= 33 and place /= 24 and place /= 25);
+        way_add <= to_sl(round = 2 and place >= 14 and place <= 33 and place /= 24 and place /= 25);
       end if;
 
       if arp = '1' then
-        way_peer <= to_bit(place <= 5 or place >= 32);
+        way_peer <= to_sl(place <= 5 or place >= 32);
       else
-        way_peer <= to_bit(place <= 5 or (place >= 30 and place <= 33) or place = 36 or place = 37);
+        way_peer <= to_sl(place <= 5 or (place >= 30 and place <= 33) or place = 36 or place = 37);
       end if;
       if place(5 downto 1) = 3 or place(5 downto 2) = 2 or
          (arp = '1' and (place(5 downto 1) = 11 or place(5 downto 2) = 6)) then
@@ -436,10 +436,10 @@ begin
         end if;
       end if;
       done_seen    <= done;
-      ev_sent      <= (change(0) or change(1)) and to_bit(result = "00");
-      ev_excessive <= (change(0) or change(1)) and to_bit(result = "01");
-      ev_late      <= (change(0) or change(1)) and to_bit(result = "10");
-      ev_deferred  <= (change(0) or change(1)) and to_bit(result = "11");
+      ev_sent      <= (change(0) or change(1)) and to_sl(result = "00");
+      ev_excessive <= (change(0) or change(1)) and to_sl(result = "01");
+      ev_late      <= (change(0) or change(1)) and to_sl(result = "10");
+      ev_deferred  <= (change(0) or change(1)) and to_sl(result = "11");
       if rst = '1' then
         slot <= '0';
       end if;

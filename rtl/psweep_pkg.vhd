@@ -80,7 +80,7 @@ package psweep_pkg is
   function deep_parts (depth : integer) return positive;
 
   -- true is '1'
-  function to_bit (b : boolean) return std_logic;
+  function to_sl (b : boolean) return std_logic;
 
 end package psweep_pkg;
 
@@ -189,12 +189,12 @@ package body psweep_pkg is
     return v_count;
   end function deep_parts;
 
-  function to_bit (b : boolean) return std_logic is
+  function to_sl (b : boolean) return std_logic is
   begin
     if b then
       return '1';
     end if;
     return '0';
-  end function to_bit;
+  end function to_sl;
 
 end package body psweep_pkg;

@@ -48,7 +48,7 @@ architecture rtl of ram_deep is
     v_behind    := (others => '0');
     v_behind(0) := '1';
     for i in 1 to C_PARTS - 1 loop
-      v_behind(i) := to_bit(unsigned(address(address'high downto clog2(deep_part(G_DEPTH, i - 1))))
+      v_behind(i) := to_sl(unsigned(address(address'high downto clog2(deep_part(G_DEPTH, i - 1))))
                             >= deep_start(G_DEPTH, i) / deep_part(G_DEPTH, i - 1));
     end loop;
     return v_behind;

@@ -420,20 +420,20 @@ begin
     severity failure;
 
   -- Reading ----------------------------------------------------------------------------------------------------------
-  scanning  <= to_bit(state = C_ST_HEADER or state = C_ST_WORDS or state = C_ST_ROWS or state = C_ST_PEER);
+  scanning  <= to_sl(state = C_ST_HEADER or state = C_ST_WORDS or state = C_ST_ROWS or state = C_ST_PEER);
   r_addr    <= std_logic_vector(pos);
   word_next <= word(23 downto 0) & r_data;
-  word_full <= have and to_bit(place(1 downto 0) = 1); -- words begin at byte 6, 10, .., 42, .., 58, ..
+  word_full <= have and to_sl(place(1 downto 0) = 1); -- words begin at byte 6, 10, .., 42, .., 58, ..
 
-  long_1     <= to_bit(end_pos >= C_ARGUMENTS + 4);
-  long_start <= to_bit(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
-  long_write <= to_bit(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
-  long_list  <= to_bit(end_pos >= C_ARGUMENTS + 4 * 40) or (to_bit(end_pos >= C_ARGUMENTS + 4 * 32) and msg_type(0));
+  long_1     <= to_sl(end_pos >= C_ARGUMENTS + 4);
+  long_start <= to_sl(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
+  long_write <= to_sl(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
+  long_list  <= to_sl(end_pos >= C_ARGUMENTS + 4 * 40) or (to_sl(end_pos >= C_ARGUMENTS + 4 * 32) and msg_type(0));
 
   -- pos is one ahead.
-  at_last    <= to_bit(pos = end_pos);
+  at_last    <= to_sl(pos = end_pos);
   words_over <= at_last when msg_type = C_TABLE
-                else to_bit(count = 20) when msg_type = C_START
+                else to_sl(count = 20) when msg_type = C_START
                 else '1';
 
   -- One subtraction for all numbers that have to be in order.
@@ -441,17 +441,17 @@ begin
               else table_id when msg_type = C_TABLE
               else map_tile;
   distance <= unsigned(word(31 downto 16)) - known;
-  is_last  <= to_bit(distance = 0);
-  is_next  <= to_bit(distance = 1);
-  idle_chip <= not row_busy and not staged and not running and to_bit(engine_state = C_STATE_IDLE);
+  is_last  <= to_sl(distance = 0);
+  is_next  <= to_sl(distance = 1);
+  idle_chip <= not row_busy and not staged and not running and to_sl(engine_state = C_STATE_IDLE);
 
-  w_valid    <= have and to_bit(state = C_ST_ROWS);
+  w_valid    <= have and to_sl(state = C_ST_ROWS);
   w_data     <= r_data;
   w_chunk    <= std_logic_vector(index);
   job_addr   <= std_logic_vector(count + 29); -- the first three words are no registers
   job_data   <= word_next;
-  job_we     <= word_full and to_bit(state = C_ST_WORDS and msg_type = C_START and count >= 3);
-  t_valid    <= word_full and to_bit(state = C_ST_WORDS and msg_type = C_TABLE);
+  job_we     <= word_full and to_sl(state = C_ST_WORDS and msg_type = C_START and count >= 3);
+  t_valid    <= word_full and to_sl(state = C_ST_WORDS and msg_type = C_TABLE);
   t_address  <= '1' & std_logic_vector(index(14 downto 0));
   t_data     <= word_next;
   row_pixels <= pixels;
@@ -459,11 +459,11 @@ begin
   tile       <= std_logic_vector(last_tile);
 
   -- Sender's MAC, IP and port: bytes 6-11, 26-29, 34-35 of the frame, in ARP 22-27, 28-31; places 0-5, 6-9, 10-11.
-  at_peer    <= to_bit((place >= 6 and place < 12) or (place >= 26 and place < 30) or place = 34 or place = 35);
+  at_peer    <= to_sl((place >= 6 and place < 12) or (place >= 26 and place < 30) or place = 34 or place = 35);
   peer_data  <= r_data;
   peer_bank  <= store;
-  peer_we    <= have and to_bit(state = C_ST_PEER) and at_peer when m_kind /= C_KIND_ARP
-                else have and to_bit(state = C_ST_PEER and place >= 22 and place < 32);
+  peer_we    <= have and to_sl(state = C_ST_PEER) and at_peer when m_kind /= C_KIND_ARP
+                else have and to_sl(state = C_ST_PEER and place >= 22 and place < 32);
   -- place - 6 in ARP and for MAC, place - 20 for IP, place - 24 for the port; modulo 16.
   peer_shift <= "101" when m_kind = C_KIND_ARP or place(5 downto 4) = 0
                 else "100" when place(5) = '1'
@@ -473,13 +473,13 @@ begin
   -- The session's memory ---------------------------------------------------------------------------------------------
   -- OPEN writes addresses and nonce, and the new token in place of its own header's; READ writes its header, and the
   -- rest as it is. OPEN is read up to its nonce, everything else up to the end of the header.
-  at_head   <= to_bit(place >= 42 and place < 58);
-  at_token  <= to_bit(place >= 46 and place < 50);
-  keep_we   <= have and to_bit(state = C_ST_PEER) and store and (not at_head or not close_q or msg_type(3));
+  at_head   <= to_sl(place >= 42 and place < 58);
+  at_token  <= to_sl(place >= 46 and place < 50);
+  keep_we   <= have and to_sl(state = C_ST_PEER) and store and (not at_head or not close_q or msg_type(3));
   keep_data <= dice(7 downto 1) & (dice(0) or (not place(1) and place(0))) when at_token = '1' and msg_type(3) = '0'
                else r_data;
   dice_next <= dice(31 downto 24) xor dice(30 downto 23) xor dice(29 downto 22) xor dice(9 downto 2);
-  differs   <= to_bit(r_data /= kept);
+  differs   <= to_sl(r_data /= kept);
   authentic <= open_q and version_ok and token_ok and peer_ok;
 
   u_kept : entity work.ram_sdp
@@ -501,24 +501,24 @@ begin
                 else (rest(C_REST_W - 2 downto 0) & pixel_bit) + C_CHUNK_PAIRS;
 
   -- Limits -----------------------------------------------------------------------------------------------------------
-  is_open   <= to_bit(m_kind = C_KIND_UDP and msg_type = C_OPEN);
+  is_open   <= to_sl(m_kind = C_KIND_UDP and msg_type = C_OPEN);
   bucket(0) <= is_open;
-  bucket(1) <= not is_open and to_bit(m_kind /= C_KIND_ARP);
-  at_bucket <= to_bit(state = C_ST_LIMIT and turn_of = bucket);
+  bucket(1) <= not is_open and to_sl(m_kind /= C_KIND_ARP);
+  at_bucket <= to_sl(state = C_ST_LIMIT and turn_of = bucket);
 
   -- Map --------------------------------------------------------------------------------------------------------------
   f_chunk  <= std_logic_vector(read_next);
   map_keep <= keep;
-  map_due  <= read_active and map_busy and f_ready and not settle(0) and to_bit(read_tile = map_tile);
-  f_take   <= p_ready and to_bit(state = C_ST_CELLS);
+  map_due  <= read_active and map_busy and f_ready and not settle(0) and to_sl(read_tile = map_tile);
+  f_take   <= p_ready and to_sl(state = C_ST_CELLS);
 
   -- Reply ------------------------------------------------------------------------------------------------------------
   s_kind    <= C_KIND_UDP when is_map = '1' else m_kind;
   s_bank     <= store;
-  in_header <= to_bit(out_word < 4);
-  in_bitmap <= to_bit(out_word >= 13) and not is_list and not is_map;
+  in_header <= to_sl(out_word < 4);
+  in_bitmap <= to_sl(out_word >= 13) and not is_list and not is_map;
   is_list   <= lists and not in_header and not is_map;
-  at_end    <= to_bit(out_word = out_end and out_byte = 3);
+  at_end    <= to_sl(out_word = out_end and out_byte = 3);
   body_index <= resize(out_word, 6) - 4;
   c_index   <= std_logic_vector(body_index);
   -- From the first word of a status block to the last.
@@ -555,7 +555,7 @@ begin
     word_bytes(i) <= (others => '-');
   end generate g_high;
 
-  own_word   <= to_bit(out_word(0) = '1' and out_word(1) = '1' and out_byte(1) = '1') and is_map;
+  own_word   <= to_sl(out_word(0) = '1' and out_word(1) = '1' and out_byte(1) = '1') and is_map;
   byte_index <= out_word(3 downto 0) & out_byte;
   list_index <= body_index(4 downto 0) & out_byte;
 
@@ -567,7 +567,7 @@ begin
 
   -- Header of a reply: the request's bytes, but version, type, code and a zero, and OPEN's token. Header of a map
   -- packet: that of its READ, likewise. ICMP: words 0 and 1, whose first and last bytes are the frame's, and that zero.
-  from_kept <= is_map or (store and to_bit(out_word(1 downto 0) = 1));
+  from_kept <= is_map or (store and to_sl(out_word(1 downto 0) = 1));
 
   p_head : process (out_word, out_byte, r_data, kept, from_kept, msg_type, code)
   begin
@@ -598,12 +598,12 @@ begin
                else own_mac(7 downto 0) when body_index = 15
                else C_INFO_BYTES(to_integer(list_index));
 
-  p_valid <= f_valid when state = C_ST_CELLS else to_bit(state = C_ST_SHOW);
+  p_valid <= f_valid when state = C_ST_CELLS else to_sl(state = C_ST_SHOW);
   p_last  <= f_last when state = C_ST_CELLS else at_end and not is_map;
 
   -- A byte is there three clocks after its number (later if a counter takes longer), one of the bitmap after its bits.
-  fetched <= to_bit(step = 9) when in_bitmap = '1'
-             else to_bit(step >= 3) and (c_valid or not is_list or not msg_type(2));
+  fetched <= to_sl(step = 9) when in_bitmap = '1'
+             else to_sl(step >= 3) and (c_valid or not is_list or not msg_type(2));
 
   -- The one process of the sequence ----------------------------------------------------------------------------------
   p_sequence : process (clk)
@@ -736,8 +736,8 @@ begin
         if have = '1' then
           if place = C_HEADER + 3 then
             msg_type   <= r_data;
-            magic_ok   <= to_bit(word_next(31 downto 16) = x"5053");
-            version_ok <= to_bit(word_next(15 downto 8) = x"02");
+            magic_ok   <= to_sl(word_next(31 downto 16) = x"5053");
+            version_ok <= to_sl(word_next(15 downto 8) = x"02");
           elsif place = C_HEADER + 10 then
             answer <= r_data(0);
           elsif place = C_HEADER + 15 then
@@ -896,7 +896,7 @@ begin
             end if;
           elsif msg_type = C_READ then
             v_left      := not unsigned(word_next(31 downto 16));
-            read_active <= to_bit(unsigned(word_next(31 downto 16)) /= 0);
+            read_active <= to_sl(unsigned(word_next(31 downto 16)) /= 0);
             settle      <= (others => '1');
             if of_map = '1' then
               keep <= word_next(15 downto 0);
@@ -1162,7 +1162,7 @@ begin
         bucket_2 <= bucket_0 + 1;
       end if;
 
-      ms_tick  <= to_bit(ms_clock = G_CLK_KHZ - 1);
+      ms_tick  <= to_sl(ms_clock = G_CLK_KHZ - 1);
       ms_clock <= ms_clock + 1;
 
       rows_short <= row_busy and not running;
@@ -1170,11 +1170,11 @@ begin
       events(25) <= '0';
       if rows_short = '1' then
         rows_wait  <= rows_wait + 1;
-        events(24) <= to_bit(rows_wait = 255);
+        events(24) <= to_sl(rows_wait = 255);
       end if;
       if engine_wait = '1' then
         map_wait   <= map_wait + 1;
-        events(25) <= to_bit(map_wait = 255);
+        events(25) <= to_sl(map_wait = 255);
       end if;
 
       if rst = '1' then
@@ -1195,7 +1195,7 @@ begin
     end if;
   end process p_time;
 
-  lapse       <= ms_tick and to_bit(quiet_ms = G_SESSION_MS - 1);
+  lapse       <= ms_tick and to_sl(quiet_ms = G_SESSION_MS - 1);
   stuck       <= (expired and ms_tick) or (not open_q and (lapse or quiet_ms(10)));
   full_duplex <= duplex_mode(1) or (pin_full_duplex and not duplex_mode(0));
   session     <= open_q;

@@ -93,7 +93,7 @@ architecture rtl of storage is
   constant C_COL_W  : integer := clog2(G_IMG_COLS);
   constant C_COPIES : integer := G_LANES / 2;
 
-  constant C_RECTIFIED : std_logic := to_bit(G_RECTIFIED = 1);
+  constant C_RECTIFIED : std_logic := to_sl(G_RECTIFIED = 1);
 
   -- Load.
   signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row (pair) being loaded
@@ -259,7 +259,7 @@ begin
     row_even <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     row_odd  <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     xi       <= s0_xi(n * C_INT_W + C_COL_W - 1 downto n * C_INT_W);
-    writes   <= write_any and to_bit(G_LANES > 1 and n mod 2 = 0);
+    writes   <= write_any and to_sl(G_LANES > 1 and n mod 2 = 0);
     column   <= write_addr when writes = '1'
                 else std_logic_vector(resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W));
     round_up <= xi(0) and not writes;
@@ -498,7 +498,7 @@ begin
     p_rules : process (clk)
     begin
       if rising_edge(clk) then
-        assert (load_valid or (write_any and to_bit(G_LANES > 1))) /= '1' or s_valid(n) /= '1'
+        assert (load_valid or (write_any and to_sl(G_LANES > 1))) /= '1' or s_valid(n) /= '1'
           report "storage: a pixel is written while samples are read"
           severity failure;
         assert write_any /= '1' or G_LANES = 1 or n mod 2 = 1

@@ -145,7 +145,7 @@ proof async_fifo async_fifo '-gG_DATA_W=1 -gG_DEPTH_LOG2=2' \
 proof stream_fifo stream_fifo '-gG_DATA_W=3 -gG_DEPTH_LOG2=2' '' \
   'rtl/psweep_pkg.vhd rtl/ram_sdp.vhd rtl/stream_fifo.vhd' \
   rtl/stream_fifo.vhd 'one place too many' 's/write_place \+ 1 \/= read_place/write_place + 2 \/= read_place/' \
-  rtl/stream_fifo.vhd 'shown while it is written' 's/to_bit\(next_place \/= write_place\);/s_fire or &/' \
+  rtl/stream_fifo.vhd 'shown while it is written' 's/to_sl\(next_place \/= write_place\);/s_fire or &/' \
   rtl/stream_fifo.vhd 'beats behind are forgotten' 's/more +<= s_fire or/more <=/'
 
 proof crc_step crc_step '' '' 'rtl/eth_pkg.vhd tb/formal/crc_step.vhd' \

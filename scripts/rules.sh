@@ -70,7 +70,7 @@ try control "s/if is_sweep = '1' and at_last = '1' then\$/if is_sweep = '1' then
   'address_generator: the plane changed within a row'
 try control 's/to_unsigned\(C_ROW_MIN - 1, C_COL_W\)/to_unsigned(C_ROW_MIN - 2, C_COL_W)/' \
   'address_generator: a row without a sample, or too close'
-try address_generator "s/return to_bit\(position\(31 downto C_POS_FRAC\) < .*/return '1';/" \
+try address_generator "s/return to_sl\(position\(31 downto C_POS_FRAC\) < .*/return '1';/" \
   'address_generator: a usable sample lies outside'
 try storage 's/write_row <= write_row \+ C_PITCH;/write_row <= write_row + C_PITCH + 1;/' 'storage: a pixel of a usable'
 try control 's/load_valid +<= pix_fire;/load_valid <= pix_fire or is_sweep;/' 'storage: a pixel is written while'
