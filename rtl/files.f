@@ -22,6 +22,7 @@ reset_filter.vhd
 ram_dc.vhd
 async_fifo.vhd
 eth_pkg.vhd
+link_pkg.vhd
 mac_rx.vhd
 mac_tx.vhd
 packet_rx.vhd

@@ -23,6 +23,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity map_buffer is
   generic (
@@ -79,7 +80,7 @@ architecture rtl of map_buffer is
   constant C_INDEX_W    : integer := clog2(G_CHUNK_CELLS);
   constant C_COUNT_W    : integer := clog2(G_CELLS + 1);
   constant C_CHUNK_W    : integer := clog2((G_CELLS + C_CHUNK - 1) / C_CHUNK + 1);
-  constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
+  constant C_CELL_BYTES : integer := cell_bytes(G_CELL_W);
 
   -- Read: off; the start address walks; cells leave. The codes differ in two bits.
   constant C_OFF  : std_logic_vector(2 downto 0) := "000";

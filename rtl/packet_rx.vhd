@@ -49,6 +49,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity packet_rx is
   generic (
@@ -158,12 +159,8 @@ architecture rtl of packet_rx is
   signal restart    : std_logic;
   signal head_byte  : std_logic_vector(7 downto 0);
   signal body_byte  : std_logic_vector(7 downto 0);
-  signal head_add   : unsigned(9 downto 0);
-  signal body_add   : unsigned(9 downto 0);
-  signal head_sum   : unsigned(15 downto 0);
-  signal head_carry : std_logic;
-  signal body_sum   : unsigned(15 downto 0);
-  signal body_carry : std_logic;
+  signal head_sum   : unsigned(16 downto 0); -- the carry on the left
+  signal body_sum   : unsigned(16 downto 0);
 
   -- Judgement.
   signal ip_bad  : std_logic;
@@ -268,36 +265,10 @@ begin
   ip_at  <= (place(1) xor (arp and place(5))) & place(0);
 
   -- Expected bytes ----------------------------------------------------------------------------------------------------
-  p_mac_byte : process (own_mac, mac_at)
-  begin
-    if mac_at = "110" then
-      mac_byte <= own_mac(47 downto 40);
-    elsif mac_at = "111" then
-      mac_byte <= own_mac(39 downto 32);
-    elsif mac_at(1 downto 0) = "00" then
-      mac_byte <= own_mac(31 downto 24);
-    elsif mac_at(1 downto 0) = "01" then
-      mac_byte <= own_mac(23 downto 16);
-    elsif mac_at(1 downto 0) = "10" then
-      mac_byte <= own_mac(15 downto 8);
-    else
-      mac_byte <= own_mac(7 downto 0);
-    end if;
-  end process p_mac_byte;
+  mac_byte <= mac_byte_of(own_mac, mac_at);
 
   -- All but the sender of ARP begin at a multiple of 4.
-  p_ip_byte : process (own_ip, ip_at)
-  begin
-    if ip_at = "00" then
-      ip_byte <= own_ip(31 downto 24);
-    elsif ip_at = "01" then
-      ip_byte <= own_ip(23 downto 16);
-    elsif ip_at = "10" then
-      ip_byte <= own_ip(15 downto 8);
-    else
-      ip_byte <= own_ip(7 downto 0);
-    end if;
-  end process p_ip_byte;
+  ip_byte  <= word_byte(own_ip, ip_at);
 
   length_byte <= "00000" & std_logic_vector(length(10 downto 8)) when place(0) = '0' else
                  std_logic_vector(length(7 downto 0));
@@ -455,34 +426,26 @@ begin
                data when behind(0) = '0' else
                (others => '0');
 
-  -- The lowest bit brings the carry in.
-  head_add <= ('0' & head_sum(15 downto 8) & '1') + ('0' & unsigned(head_byte) & head_carry);
-  body_add <= ('0' & body_sum(15 downto 8) & '1') + ('0' & unsigned(body_byte) & body_carry);
-
   p_sums : process (clk)
   begin
     if rising_edge(clk) then
       if got = '1' then
-        head_sum   <= head_sum(7 downto 0) & head_add(8 downto 1);
-        head_carry <= head_add(9);
-        body_sum   <= body_sum(7 downto 0) & body_add(8 downto 1);
-        body_carry <= body_add(9);
+        head_sum <= checksum_add(head_sum, head_byte);
+        body_sum <= checksum_add(body_sum, body_byte);
       end if;
       if rst = '1' or verdict = '1' then
-        head_sum   <= (others => '0');
-        head_carry <= '0';
+        head_sum <= (others => '0');
       end if;
       if rst = '1' or verdict = '1' or restart = '1' then
-        body_sum   <= (others => '0');
-        body_carry <= '0';
+        body_sum <= (others => '0');
       end if;
     end if;
   end process p_sums;
 
   -- Judgement ---------------------------------------------------------------------------------------------------------
   ip_bad  <= to_sl(length(10 downto 3) = 0) or not behind(4) or
-             (not arp and (bad_head or to_sl(head_sum /= x"ffff")));
-  sum_bad <= bad_length or (to_sl(body_sum /= x"ffff") and (icmp or has_checksum));
+             (not arp and (bad_head or to_sl(head_sum(15 downto 0) /= x"ffff")));
+  sum_bad <= bad_length or (to_sl(body_sum(15 downto 0) /= x"ffff") and (icmp or has_checksum));
 
   p_outcome : process (data, half_duplex, not_mine, not_all, bad_type, ip_bad, bad_source, arp, icmp, bad_fragment,
                        bad_kind, sum_bad, closed, room)

@@ -25,6 +25,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity responder is
   generic (
@@ -152,45 +153,14 @@ end entity responder;
 
 architecture rtl of responder is
 
-  -- Message types and codes.
-  constant C_OPEN     : std_logic_vector(7 downto 0) := x"01";
-  constant C_CLOSE    : std_logic_vector(7 downto 0) := x"02";
-  constant C_INFO     : std_logic_vector(7 downto 0) := x"03";
-  constant C_COUNTERS : std_logic_vector(7 downto 0) := x"04";
-  constant C_TABLE    : std_logic_vector(7 downto 0) := x"06";
-  constant C_START    : std_logic_vector(7 downto 0) := x"07";
-  constant C_WRITE    : std_logic_vector(7 downto 0) := x"08";
-  constant C_READ     : std_logic_vector(7 downto 0) := x"09";
-  constant C_RELEASE  : std_logic_vector(7 downto 0) := x"0a";
-  constant C_SET      : std_logic_vector(7 downto 0) := x"0b";
-  constant C_MAP      : std_logic_vector(7 downto 0) := x"8c";
-
-  constant C_OK          : std_logic_vector(2 downto 0) := "000";
-  constant C_BUSY        : std_logic_vector(2 downto 0) := "001";
-  constant C_NO_SESSION  : std_logic_vector(2 downto 0) := "010";
-  constant C_BAD_MESSAGE : std_logic_vector(2 downto 0) := "011";
-  constant C_ORDER       : std_logic_vector(2 downto 0) := "100";
-  constant C_NOT_READY   : std_logic_vector(2 downto 0) := "101";
-
-  constant C_KIND_ARP  : std_logic_vector(1 downto 0) := "00";
-  constant C_KIND_ICMP : std_logic_vector(1 downto 0) := "01";
-  constant C_KIND_UDP  : std_logic_vector(1 downto 0) := "10";
-  constant C_KIND_CLOSED : std_logic_vector(1 downto 0) := "11"; -- UDP to a closed port
-
   -- Sizes that follow from the generics.
-  constant C_PAIR_BYTES  : integer := (2 * G_PIX_W + 7) / 8;
-  constant C_CHUNK_PAIRS : integer := G_CHUNK_BYTES / C_PAIR_BYTES;
-  constant C_WRITE_BYTES : integer := C_CHUNK_PAIRS * C_PAIR_BYTES;
-  constant C_CELL_W      : integer := 1 + clog2(G_PLANES) + G_FRAC_W + G_MNCC_W;
-  constant C_CELL_BYTES  : integer := (C_CELL_W + 7) / 8;
-  constant C_MAP_WORDS   : integer := (G_ROW_SLOTS + 31) / 32; -- of the bitmap
-  constant C_HEADER      : integer := 42;                      -- first byte of the message in the frame
-  constant C_ARGUMENTS   : integer := C_HEADER + 16;
-  constant C_STATUS_END  : integer := 4 + 9 + C_MAP_WORDS - 1; -- last word of a reply, its header being 0 to 3
-  constant C_HEADER_END  : integer := 4 - 1;
-  constant C_INFO_END    : integer := 4 + 32 - 1;
-  constant C_COUNT_END   : integer := 4 + 40 - 1;
-  constant C_OUT_W       : integer := clog2(imax(C_STATUS_END, C_COUNT_END) + 1);
+  constant C_CHUNK_PAIRS : integer := chunk_pairs(G_CHUNK_BYTES, G_PIX_W);
+  constant C_CELL_W      : integer := cell_bits(G_PLANES, G_FRAC_W, G_MNCC_W);
+  constant C_HEADER_END  : integer := C_HEADER_WORDS - 1; -- last word of a reply
+  constant C_STATUS_END  : integer := C_HEADER_WORDS + C_STATUS_WORDS + bitmap_words(G_ROW_SLOTS) - 1;
+  constant C_INFO_END    : integer := C_HEADER_WORDS + C_INFO_WORDS - 1;
+  constant C_COUNT_END   : integer := C_HEADER_WORDS + C_EVENTS - 1;
+  constant C_OUT_W       : integer := reply_bits(G_ROW_SLOTS);
   constant C_REST_W      : integer := clog2(C_CHUNK_PAIRS + 1) + 1;
 
   -- Capabilities. Words 14 and 15 are the address, which depends on pins.
@@ -215,11 +185,11 @@ architecture rtl of responder is
     v_words(13) := std_logic_vector(to_unsigned(C_CELL_W, 32));
     v_words(16) := std_logic_vector(to_unsigned(G_CLK_KHZ, 32));
     v_words(17) := std_logic_vector(to_unsigned(G_CHUNK_BYTES, 32));
-    v_words(18) := std_logic_vector(to_unsigned(C_PAIR_BYTES, 32));
+    v_words(18) := std_logic_vector(to_unsigned(pair_bytes(G_PIX_W), 32));
     v_words(19) := std_logic_vector(to_unsigned(C_CHUNK_PAIRS, 32));
     v_words(20) := std_logic_vector(to_unsigned(G_ROW_SLOTS, 32));
-    v_words(21) := std_logic_vector(to_unsigned(C_CELL_BYTES, 32));
-    v_words(22) := std_logic_vector(to_unsigned(G_CHUNK_BYTES / C_CELL_BYTES, 32));
+    v_words(21) := std_logic_vector(to_unsigned(cell_bytes(C_CELL_W), 32));
+    v_words(22) := std_logic_vector(to_unsigned(chunk_cells(G_CHUNK_BYTES, C_CELL_W), 32));
     v_words(23) := std_logic_vector(to_unsigned(G_MAP_DEPTH, 32));
     v_words(24) := std_logic_vector(to_unsigned(G_SESSION_MS, 32));
     v_words(25) := std_logic_vector(to_unsigned(G_RX_SLOTS, 32));
@@ -227,14 +197,14 @@ architecture rtl of responder is
     v_words(27) := std_logic_vector(to_unsigned(G_RECTIFIED, 32));
     return v_words;
   end function info_words;
-  constant C_INFO_WORDS : t_words := info_words;
+  constant C_INFO_TABLE : t_words := info_words;
 
   type t_info is array (127 downto 0) of std_logic_vector(7 downto 0);
   function info_bytes return t_info is
     variable v_bytes : t_info;
   begin
     for i in 0 to 127 loop
-      v_bytes(i) := C_INFO_WORDS(i / 4)(31 - 8 * (i mod 4) downto 24 - 8 * (i mod 4));
+      v_bytes(i) := C_INFO_TABLE(i / 4)(31 - 8 * (i mod 4) downto 24 - 8 * (i mod 4));
     end loop;
     return v_bytes;
   end function info_bytes;
@@ -242,22 +212,6 @@ architecture rtl of responder is
 
   type t_bytes is array (63 downto 0) of std_logic_vector(7 downto 0);
 
-  -- The state with even parity.
-  constant C_ST_IDLE   : std_logic_vector(4 downto 0) := "00000"; -- the next message, or the next chunk of the map
-  constant C_ST_HEADER : std_logic_vector(4 downto 0) := "00011"; -- bytes 6 to 57 pass
-  constant C_ST_DECIDE : std_logic_vector(4 downto 0) := "00101"; -- word = tile and index
-  constant C_ST_LIMIT  : std_logic_vector(4 downto 0) := "00110"; -- takes an answer from its bucket
-  constant C_ST_WORDS  : std_logic_vector(4 downto 0) := "01001"; -- arguments pass
-  constant C_ST_DIVIDE : std_logic_vector(4 downto 0) := "01010"; -- are these the chunks of so many pixels?
-  constant C_ST_CHECK  : std_logic_vector(4 downto 0) := "01100"; -- the row buffer looks at the chunk
-  constant C_ST_ROWS   : std_logic_vector(4 downto 0) := "01111"; -- pixels pass
-  constant C_ST_WAIT   : std_logic_vector(4 downto 0) := "10001"; -- for packet_tx
-  constant C_ST_PEER   : std_logic_vector(4 downto 0) := "10010"; -- the sender's addresses go to packet_tx
-  constant C_ST_FETCH  : std_logic_vector(4 downto 0) := "10100"; -- one byte of the reply: address out ..
-  constant C_ST_SHOW   : std_logic_vector(4 downto 0) := "10111"; -- .. and byte to packet_tx
-  constant C_ST_CELLS  : std_logic_vector(4 downto 0) := "11000"; -- bytes of the map to packet_tx
-  constant C_ST_DONE   : std_logic_vector(4 downto 0) := "11011"; -- the frame's slot is free
-  constant C_ST_ABORT  : std_logic_vector(4 downto 0) := "11101"; -- engine, buffers and session
   signal state : std_logic_vector(4 downto 0);
 
   -- Reading the frame: byte place (mod 64) is on r_data while have = '1'.
@@ -425,20 +379,20 @@ begin
   word_next <= word(23 downto 0) & r_data;
   word_full <= have and to_sl(place(1 downto 0) = 1); -- words begin at byte 6, 10, .., 42, .., 58, ..
 
-  long_1     <= to_sl(end_pos >= C_ARGUMENTS + 4);
-  long_start <= to_sl(end_pos >= C_ARGUMENTS + 12 + 4 * 18);
-  long_write <= to_sl(end_pos = C_ARGUMENTS + C_WRITE_BYTES);
-  long_list  <= to_sl(end_pos >= C_ARGUMENTS + 4 * 40) or (to_sl(end_pos >= C_ARGUMENTS + 4 * 32) and msg_type(0));
+  long_1     <= to_sl(end_pos >= C_AT_ARGUMENTS + 4);
+  long_start <= to_sl(end_pos >= C_AT_ARGUMENTS + 4 * (C_START_FIELDS + C_JOB_WORDS));
+  long_write <= to_sl(end_pos = C_AT_ARGUMENTS + write_bytes(G_CHUNK_BYTES, G_PIX_W));
+  long_list  <= to_sl(end_pos >= C_AT_ARGUMENTS + 4 * 40) or (to_sl(end_pos >= C_AT_ARGUMENTS + 4 * 32) and msg_type(0));
 
   -- pos is one ahead.
   at_last    <= to_sl(pos = end_pos);
-  words_over <= at_last when msg_type = C_TABLE
-                else to_sl(count = 20) when msg_type = C_START
+  words_over <= at_last when msg_type = C_MSG_TABLE
+                else to_sl(count = 20) when msg_type = C_MSG_START
                 else '1';
 
   -- One subtraction for all numbers that have to be in order.
-  known    <= last_tile when msg_type = C_START or msg_type = C_WRITE
-              else table_id when msg_type = C_TABLE
+  known    <= last_tile when msg_type = C_MSG_START or msg_type = C_MSG_WRITE
+              else table_id when msg_type = C_MSG_TABLE
               else map_tile;
   distance <= unsigned(word(31 downto 16)) - known;
   is_last  <= to_sl(distance = 0);
@@ -450,8 +404,8 @@ begin
   w_chunk    <= std_logic_vector(index);
   job_addr   <= std_logic_vector(count + 29); -- the first three words are no registers
   job_data   <= word_next;
-  job_we     <= word_full and to_sl(state = C_ST_WORDS and msg_type = C_START and count >= 3);
-  t_valid    <= word_full and to_sl(state = C_ST_WORDS and msg_type = C_TABLE);
+  job_we     <= word_full and to_sl(state = C_ST_WORDS and msg_type = C_MSG_START and count >= 3);
+  t_valid    <= word_full and to_sl(state = C_ST_WORDS and msg_type = C_MSG_TABLE);
   t_address  <= '1' & std_logic_vector(index(14 downto 0));
   t_data     <= word_next;
   row_pixels <= pixels;
@@ -462,10 +416,10 @@ begin
   at_peer    <= to_sl((place >= 6 and place < 12) or (place >= 26 and place < 30) or place = 34 or place = 35);
   peer_data  <= r_data;
   peer_bank  <= store;
-  peer_we    <= have and to_sl(state = C_ST_PEER) and at_peer when m_kind /= C_KIND_ARP
+  peer_we    <= have and to_sl(state = C_ST_PEER) and at_peer when m_kind /= C_FRAME_ARP
                 else have and to_sl(state = C_ST_PEER and place >= 22 and place < 32);
   -- place - 6 in ARP and for MAC, place - 20 for IP, place - 24 for the port; modulo 16.
-  peer_shift <= "101" when m_kind = C_KIND_ARP or place(5 downto 4) = 0
+  peer_shift <= "101" when m_kind = C_FRAME_ARP or place(5 downto 4) = 0
                 else "100" when place(5) = '1'
                 else "110";
   peer_index <= std_logic_vector(place(3 downto 1) + peer_shift) & place(0);
@@ -501,9 +455,9 @@ begin
                 else (rest(C_REST_W - 2 downto 0) & pixel_bit) + C_CHUNK_PAIRS;
 
   -- Limits -----------------------------------------------------------------------------------------------------------
-  is_open   <= to_sl(m_kind = C_KIND_UDP and msg_type = C_OPEN);
+  is_open   <= to_sl(m_kind = C_FRAME_UDP and msg_type = C_MSG_OPEN);
   bucket(0) <= is_open;
-  bucket(1) <= not is_open and to_sl(m_kind /= C_KIND_ARP);
+  bucket(1) <= not is_open and to_sl(m_kind /= C_FRAME_ARP);
   at_bucket <= to_sl(state = C_ST_LIMIT and turn_of = bucket);
 
   -- Map --------------------------------------------------------------------------------------------------------------
@@ -513,7 +467,7 @@ begin
   f_take   <= p_ready and to_sl(state = C_ST_CELLS);
 
   -- Reply ------------------------------------------------------------------------------------------------------------
-  s_kind    <= C_KIND_UDP when is_map = '1' else m_kind;
+  s_kind    <= C_FRAME_UDP when is_map = '1' else m_kind;
   s_bank     <= store;
   in_header <= to_sl(out_word < 4);
   in_bitmap <= to_sl(out_word >= 13) and not is_list and not is_map;
@@ -576,9 +530,9 @@ begin
       head_byte <= kept;
     end if;
     if out_word(1 downto 0) = 0 and out_byte = 2 then
-      head_byte <= x"02";
+      head_byte <= C_VERSION;
     elsif out_word(1 downto 0) = 0 and out_byte = 3 then
-      head_byte <= msg_type or x"80";
+      head_byte <= msg_type or C_MSG_REPLY;
     elsif out_word(1 downto 0) = 2 and out_byte = 2 then
       head_byte <= "00000" & code;
     elsif out_word(1 downto 0) = 2 and out_byte = 3 then
@@ -586,16 +540,9 @@ begin
     end if;
   end process p_head;
 
-  list_byte <= c_data(31 downto 24) when msg_type(2) = '1' and out_byte = 0
-               else c_data(23 downto 16) when msg_type(2) = '1' and out_byte = 1
-               else c_data(15 downto 8) when msg_type(2) = '1' and out_byte = 2
-               else c_data(7 downto 0) when msg_type(2) = '1'
-               else own_mac(47 downto 40) when body_index = 14 and out_byte = 2
-               else own_mac(39 downto 32) when body_index = 14 and out_byte = 3
-               else own_mac(31 downto 24) when body_index = 15 and out_byte = 0
-               else own_mac(23 downto 16) when body_index = 15 and out_byte = 1
-               else own_mac(15 downto 8) when body_index = 15 and out_byte = 2
-               else own_mac(7 downto 0) when body_index = 15
+  list_byte <= word_byte(c_data, out_byte) when msg_type(2) = '1'
+               else mac_byte_of(own_mac, not body_index(0) & out_byte)
+                    when (body_index = 14 and out_byte(1) = '1') or body_index = 15
                else C_INFO_BYTES(to_integer(list_index));
 
   p_valid <= f_valid when state = C_ST_CELLS else to_sl(state = C_ST_SHOW);
@@ -630,17 +577,17 @@ begin
       map_clear   <= '0';
       f_start     <= '0';
       stop        <= '0';
-      events(16)  <= '0';
-      events(17)  <= '0';
-      events(22)  <= '0';
-      events(23)  <= '0';
-      events(26)  <= '0';
-      events(27)  <= '0';
-      events(28)  <= '0';
-      events(30)  <= '0';
-      events(31)  <= '0';
-      events(34)  <= '0';
-      events(35)  <= '0';
+      events(C_EV_BAD_MESSAGE) <= '0';
+      events(C_EV_FOREIGN) <= '0';
+      events(C_EV_SESSION) <= '0';
+      events(C_EV_TIMEOUT) <= '0';
+      events(C_EV_CHUNK_REPEATED) <= '0';
+      events(C_EV_CHUNK_REFUSED) <= '0';
+      events(C_EV_MAP_PACKET) <= '0';
+      events(C_EV_LIMITED) <= '0';
+      events(C_EV_ANSWER) <= '0';
+      events(C_EV_UNREACHABLE) <= '0';
+      events(C_EV_RECOVERED) <= '0';
       tx_abort    <= '0';
       v_recover   := '0';
       v_bad       := '0';
@@ -700,7 +647,7 @@ begin
         one_more   <= '0';
         rest       <= (others => '0');
         heard      <= not open_q; -- without a session the time is that of a message
-        code       <= C_OK;
+        code       <= C_RESULT_OK;
         count      <= (others => '0');
         out_word   <= (others => '0');
         out_byte   <= (others => '0');
@@ -708,13 +655,13 @@ begin
         step       <= (others => '0');
         have       <= '0';
         v_pos      := to_unsigned(6, 11);
-        end_pos    <= unsigned(m_length) + C_HEADER;
+        end_pos    <= unsigned(m_length) + C_AT_MESSAGE;
         if open_q = '1' and expired = '1' then
-          events(23) <= '1';
+          events(C_EV_TIMEOUT) <= '1';
           by_timer   <= '1';
           state      <= C_ST_ABORT;
         elsif m_valid = '1' and (map_turn = '0' or map_due = '0') then
-          if m_kind = C_KIND_UDP then
+          if m_kind = C_FRAME_UDP then
             state <= C_ST_HEADER;
           else
             is_icmp <= m_kind(0);
@@ -724,23 +671,23 @@ begin
           is_map     <= '1';
           store      <= '1';
           map_turn   <= '0';
-          msg_type   <= C_MAP;
-          v_pos      := to_unsigned(C_HEADER, 11);
+          msg_type   <= C_MSG_MAP;
+          v_pos      := to_unsigned(C_AT_MESSAGE, 11);
           f_start    <= '1';
           s_start    <= '1';
-          events(28) <= '1';
+          events(C_EV_MAP_PACKET) <= '1';
           state      <= C_ST_FETCH;
         end if;
 
       elsif state = C_ST_HEADER then
         if have = '1' then
-          if place = C_HEADER + 3 then
+          if place = C_AT_MESSAGE + 3 then
             msg_type   <= r_data;
-            magic_ok   <= to_sl(word_next(31 downto 16) = x"5053");
-            version_ok <= to_sl(word_next(15 downto 8) = x"02");
-          elsif place = C_HEADER + 10 then
+            magic_ok   <= to_sl(word_next(31 downto 16) = C_MAGIC);
+            version_ok <= to_sl(word_next(15 downto 8) = C_VERSION);
+          elsif place = C_AT_MESSAGE + 10 then
             answer <= r_data(0);
-          elsif place = C_HEADER + 15 then
+          elsif place = C_AT_MESSAGE + 15 then
             have  <= '0';
             state <= C_ST_DECIDE;
           end if;
@@ -749,7 +696,7 @@ begin
       elsif state = C_ST_DECIDE then
         v_index   := unsigned(word(15 downto 0));
         of_map    <= is_last;
-        v_pos     := to_unsigned(C_ARGUMENTS, 11);
+        v_pos     := to_unsigned(C_AT_ARGUMENTS, 11);
         state     <= C_ST_WAIT;
         v_go      := '0';
         heard     <= authentic;
@@ -757,21 +704,21 @@ begin
           out_end <= to_unsigned(C_HEADER_END, C_OUT_W);
           state   <= C_ST_LIMIT;
         end if;
-        if magic_ok = '0' or end_pos < C_ARGUMENTS then
+        if magic_ok = '0' or end_pos < C_AT_ARGUMENTS then
           v_bad := '1';
           heard <= '0';
           state <= C_ST_DONE;
         elsif msg_type(7) = '1' then
-          events(31) <= '1';
+          events(C_EV_ANSWER) <= '1';
           heard      <= '0';
           state      <= C_ST_DONE;
-        elsif msg_type = C_OPEN then
+        elsif msg_type = C_MSG_OPEN then
           v_bad   := not version_ok or not long_1;
           out_end <= to_unsigned(C_HEADER_END, C_OUT_W);
           state   <= C_ST_LIMIT;
-        elsif version_ok = '0' or msg_type = x"00" or unsigned(msg_type) > unsigned(C_SET) then
+        elsif version_ok = '0' or msg_type = x"00" or unsigned(msg_type) > unsigned(C_MSG_SET) then
           v_bad := '1';
-        elsif msg_type = C_INFO or msg_type = C_COUNTERS then
+        elsif msg_type = C_MSG_INFO or msg_type = C_MSG_COUNTERS then
           lists <= long_list;
           v_bad := not long_list;
           if long_list = '0' then
@@ -782,80 +729,80 @@ begin
             out_end <= to_unsigned(C_INFO_END, C_OUT_W);
           end if;
         elsif open_q = '0' then
-          if msg_type /= C_CLOSE then
-            code <= C_NO_SESSION;
+          if msg_type /= C_MSG_CLOSE then
+            code <= C_RESULT_NO_SESSION;
           end if;
         elsif authentic = '0' then
-          events(17) <= '1';
-          code       <= C_BUSY;
+          events(C_EV_FOREIGN) <= '1';
+          code       <= C_RESULT_BUSY;
         else
           v_go := '1';
         end if;
         if v_go = '1' then
-          if msg_type = C_CLOSE then
+          if msg_type = C_MSG_CLOSE then
             state <= C_ST_ABORT;
-          elsif msg_type = C_READ or msg_type = C_SET then
+          elsif msg_type = C_MSG_READ or msg_type = C_MSG_SET then
             if long_1 = '1' then
               state <= C_ST_WORDS;
             else
               v_bad := '1';
             end if;
-            if msg_type = C_READ and long_1 = '1' then
+            if msg_type = C_MSG_READ and long_1 = '1' then
               read_active <= '0';
               read_tile   <= unsigned(word(31 downto 16));
               v_next      := unsigned(word(15 downto 0));
               store       <= '1';
             end if;
-          elsif msg_type = C_TABLE then
+          elsif msg_type = C_MSG_TABLE then
             -- Frame byte 42 is 2 mod 4.
             if long_1 = '0' or end_pos(1 downto 0) /= 2 then
               v_bad := '1';
             elsif is_last = '1' then
               if unsigned(word(15 downto 0)) > table_words or table_id = 0 then
-                code <= C_ORDER;
+                code <= C_RESULT_ORDER;
               elsif idle_chip = '0' then
-                code <= C_NOT_READY;
+                code <= C_RESULT_NOT_READY;
               else
                 state <= C_ST_WORDS;
               end if;
             elsif is_next = '1' and unsigned(word(15 downto 0)) = 0 then
               if idle_chip = '0' then
-                code <= C_NOT_READY;
+                code <= C_RESULT_NOT_READY;
               else
                 table_words <= (others => '0');
                 table_id    <= unsigned(word(31 downto 16)); -- + 1
                 state       <= C_ST_WORDS;
               end if;
             else
-              code <= C_ORDER;
+              code <= C_RESULT_ORDER;
             end if;
-          elsif msg_type = C_START then
+          elsif msg_type = C_MSG_START then
             if long_start = '0' then
               v_bad := '1';
             elsif is_next = '1' then
               if row_busy = '1' or staged = '1' then
-                code <= C_NOT_READY;
+                code <= C_RESULT_NOT_READY;
               else
                 state <= C_ST_WORDS;
               end if;
             elsif is_last = '0' then
-              code <= C_ORDER;
+              code <= C_RESULT_ORDER;
             end if;
-          elsif msg_type = C_WRITE then
+          elsif msg_type = C_MSG_WRITE then
             silent <= not answer;
             if long_write = '0' then
               v_bad := '1';
             elsif is_last = '0' then
-              code <= C_ORDER;
+              code <= C_RESULT_ORDER;
             elsif row_busy = '1' then
               w_check <= '1';
               state   <= C_ST_CHECK;
             end if;
-          elsif msg_type = C_RELEASE then
+          elsif msg_type = C_MSG_RELEASE then
             if is_last = '0' then
-              code <= C_ORDER;
+              code <= C_RESULT_ORDER;
             elsif map_busy = '1' and map_complete = '0' then
-              code <= C_NOT_READY;
+              code <= C_RESULT_NOT_READY;
             else
               map_release <= '1';
             end if;
@@ -866,9 +813,9 @@ begin
         if at_bucket = '1' then
           state <= C_ST_WAIT;
           if bucket_0 = 0 then
-            events(30) <= '1';
+            events(C_EV_LIMITED) <= '1';
             state      <= C_ST_DONE;
-          elsif is_open = '1' and code = C_OK then
+          elsif is_open = '1' and code = C_RESULT_OK then
             state <= C_ST_WORDS;
           end if;
         end if;
@@ -882,7 +829,7 @@ begin
             have  <= '0';
             state <= C_ST_WAIT;
           end if;
-          if msg_type = C_OPEN then
+          if msg_type = C_MSG_OPEN then
             if open_q = '0' then
               store   <= '1';
               close_q <= '0';
@@ -891,23 +838,23 @@ begin
               store <= '1';
               heard <= '1';
             else
-              events(17) <= '1';
-              code       <= C_BUSY;
+              events(C_EV_FOREIGN) <= '1';
+              code       <= C_RESULT_BUSY;
             end if;
-          elsif msg_type = C_READ then
+          elsif msg_type = C_MSG_READ then
             v_left      := not unsigned(word_next(31 downto 16));
             read_active <= to_sl(unsigned(word_next(31 downto 16)) /= 0);
             settle      <= (others => '1');
             if of_map = '1' then
               keep <= word_next(15 downto 0);
             end if;
-          elsif msg_type = C_SET then
+          elsif msg_type = C_MSG_SET then
             if index = 0 and unsigned(word_next(31 downto 2)) = 0 and word_next(1 downto 0) /= "11" then
               duplex_mode <= word_next(1 downto 0);
             else
               v_bad := '1';
             end if;
-          elsif msg_type = C_TABLE then
+          elsif msg_type = C_MSG_TABLE then
             v_index_inc := "1";
             if index = table_words and table_words(13) = '0' then
               table_words <= table_words + 1;
@@ -915,7 +862,7 @@ begin
           else
             -- START: the table it needs, pixels, chunks, registers (the fifth of them is PLANES).
             if count = 0 and unsigned(word_next(31 downto 16)) /= table_id then
-              code  <= C_ORDER;
+              code  <= C_RESULT_ORDER;
               have  <= '0';
               state <= C_ST_WAIT;
             elsif (count = 1 and (unsigned(word_next) = 0 or unsigned(word_next(31 downto 24)) /= 0))
@@ -924,7 +871,7 @@ begin
               have  <= '0';
               state <= C_ST_WAIT;
             elsif count = 7 and unsigned(word_next(10 downto 0)) > table_words(13 downto 3) then
-              code  <= C_ORDER;
+              code  <= C_RESULT_ORDER;
               have  <= '0';
               state <= C_ST_WAIT;
             elsif words_over = '1' then
@@ -967,10 +914,10 @@ begin
             state <= C_ST_ROWS;
           else
             state      <= C_ST_WAIT;
-            events(26) <= w_repeated;
-            events(27) <= not w_repeated;
+            events(C_EV_CHUNK_REPEATED) <= w_repeated;
+            events(C_EV_CHUNK_REFUSED) <= not w_repeated;
             if w_repeated = '0' then
-              code <= C_NOT_READY;
+              code <= C_RESULT_NOT_READY;
             end if;
           end if;
         end if;
@@ -995,17 +942,17 @@ begin
           have       <= '0';
           s_start    <= '1';
           map_turn   <= '1';
-          v_pos      := to_unsigned(C_HEADER, 11);
+          v_pos      := to_unsigned(C_AT_MESSAGE, 11);
           v_pos_inc  := "0";
           step       <= (others => '0');
           state      <= C_ST_FETCH;
-          events(34) <= m_kind(1) and m_kind(0);
-          if m_kind = C_KIND_ARP then
+          events(C_EV_UNREACHABLE) <= m_kind(1) and m_kind(0);
+          if m_kind = C_FRAME_ARP then
             state <= C_ST_DONE;
-          elsif m_kind = C_KIND_ICMP then
+          elsif m_kind = C_FRAME_ICMP then
             v_pos   := to_unsigned(38, 11);
             end_pos <= unsigned(m_length) + 34;
-          elsif m_kind = C_KIND_CLOSED then -- four zeros in place of bytes 10 to 13
+          elsif m_kind = C_FRAME_CLOSED then -- four zeros in place of bytes 10 to 13
             v_pos    := to_unsigned(10, 11);
             end_pos  <= to_unsigned(42, 11);
             out_word <= to_unsigned(2, C_OUT_W);
@@ -1075,7 +1022,7 @@ begin
         map_clear   <= '1';
         open_q      <= not close_q;
         heard       <= '1';
-        events(22)  <= not close_q;
+        events(C_EV_SESSION) <= not close_q;
         state       <= C_ST_WAIT;
         if by_timer = '1' then
           state <= C_ST_IDLE;
@@ -1086,14 +1033,14 @@ begin
       end if;
 
       if v_bad = '1' then
-        events(16) <= '1';
-        code       <= C_BAD_MESSAGE;
+        events(C_EV_BAD_MESSAGE) <= '1';
+        code       <= C_RESULT_BAD_MESSAGE;
       end if;
       if stuck = '1' and heard = '0' and state /= C_ST_IDLE then
         v_recover := '1';
       end if;
       if v_recover = '1' then
-        events(35) <= '1';
+        events(C_EV_RECOVERED) <= '1';
         tx_abort   <= '1';
         silent     <= '1';
         by_timer   <= '0';
@@ -1166,15 +1113,15 @@ begin
       ms_clock <= ms_clock + 1;
 
       rows_short <= row_busy and not running;
-      events(24) <= '0';
-      events(25) <= '0';
+      events(C_EV_WAIT_ROWS) <= '0';
+      events(C_EV_WAIT_MAP) <= '0';
       if rows_short = '1' then
         rows_wait  <= rows_wait + 1;
-        events(24) <= to_sl(rows_wait = 255);
+        events(C_EV_WAIT_ROWS) <= to_sl(rows_wait = 255);
       end if;
       if engine_wait = '1' then
         map_wait   <= map_wait + 1;
-        events(25) <= to_sl(map_wait = 255);
+        events(C_EV_WAIT_MAP) <= to_sl(map_wait = 255);
       end if;
 
       if rst = '1' then
@@ -1186,8 +1133,8 @@ begin
         refill    <= (others => '0');
         rows_wait <= (others => '0');
         map_wait  <= (others => '0');
-        events(24) <= '0';
-        events(25) <= '0';
+        events(C_EV_WAIT_ROWS) <= '0';
+        events(C_EV_WAIT_MAP) <= '0';
       end if;
       if rst = '1' or ms_clock = G_CLK_KHZ - 1 then
         ms_clock <= (others => '0');
@@ -1203,7 +1150,7 @@ begin
   events(15 downto 0)  <= (others => '0');
   events(21 downto 18) <= (others => '0');
   tick_ms              <= ms_tick;
-  events(29)           <= '0';
+  events(C_EV_BAD_SOURCE) <= '0';
   events(33 downto 32) <= (others => '0');
   events(39 downto 36) <= (others => '0');
 

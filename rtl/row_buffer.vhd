@@ -28,6 +28,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity row_buffer is
   generic (
@@ -74,7 +75,7 @@ end entity row_buffer;
 architecture rtl of row_buffer is
 
   constant C_PAIR_W     : integer := 2 * G_PIX_W;
-  constant C_PAIR_BYTES : integer := (C_PAIR_W + 7) / 8;
+  constant C_PAIR_BYTES : integer := pair_bytes(G_PIX_W);
   constant C_DEPTH      : integer := G_SLOTS * G_CHUNK_PAIRS;
   constant C_ADDR_W     : integer := clog2(C_DEPTH);
   constant C_SLOT_W     : integer := clog2(G_SLOTS);
