@@ -31,6 +31,16 @@ row_buffer.vhd
 map_buffer.vhd
 counters.vhd
 scheduler.vhd
+message_reader.vhd
+message_rules.vhd
+session_memory.vhd
+session_timer.vhd
+reply_limiter.vhd
+chunk_check.vhd
+map_sender.vhd
+info_rom.vhd
+reply_builder.vhd
+message_sequencer.vhd
 responder.vhd
 arbiter.vhd
 psweep_top.vhd
