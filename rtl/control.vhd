@@ -175,12 +175,7 @@ architecture rtl of control is
   signal command_clear : std_logic;
 
   -- Registers, sizes less 1.
-  signal tile_cols_ok   : std_logic;
-  signal tile_rows_ok   : std_logic;
-  signal win_cols_ok    : std_logic;
-  signal win_rows_ok    : std_logic;
-  signal planes_ok      : std_logic;
-  signal threshold_ok   : std_logic;
+  signal range_ok       : std_logic_vector(C_THRESHOLD downto C_TILE_COLS); -- which of them hold what they may
   signal tile_last_col  : unsigned(clog2(G_PLANE_COLS) - 1 downto 0);
   signal tile_last_row  : unsigned(clog2(G_PLANE_ROWS) - 1 downto 0);
   signal win_last_col_q : unsigned(clog2(G_IMG_COLS) - 1 downto 0);
@@ -425,7 +420,7 @@ begin
                    or (cfg_register and to_sl(cfg_index >= C_RIGHT + 4))
                    or (cfg_middle and is_idle);
 
-  config_bad   <= not (tile_cols_ok and tile_rows_ok and win_cols_ok and win_rows_ok and planes_ok and threshold_ok);
+  config_bad   <= to_sl(unsigned(not range_ok) /= 0);
   table_bad    <= to_sl(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
   event_config <= command_start and is_idle and config_bad;
   event_table  <= command_start and is_idle and not config_bad and table_bad;
@@ -435,34 +430,23 @@ begin
   begin
     if rising_edge(clk) then
       if cfg_register = '1' then
-        if cfg_index = C_TILE_COLS then
-          tile_cols_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            tile_last_col <= cfg_less_1(tile_last_col'range);
+        for k in range_ok'range loop
+          if cfg_index = k then
+            range_ok(k) <= cfg_in_range;
           end if;
-        elsif cfg_index = C_TILE_ROWS then
-          tile_rows_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            tile_last_row <= cfg_less_1(tile_last_row'range);
-          end if;
-        elsif cfg_index = C_WIN_COLS then
-          win_cols_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            win_last_col_q <= cfg_less_1(win_last_col_q'range);
-          end if;
-        elsif cfg_index = C_WIN_ROWS then
-          win_rows_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            win_last_row_q <= cfg_less_1(win_last_row_q'range);
-          end if;
-        elsif cfg_index = C_PLANES then
-          planes_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            last_plane <= cfg_less_1(last_plane'range);
-          end if;
+        end loop;
+        if cfg_index = C_TILE_COLS and cfg_in_range = '1' then
+          tile_last_col <= cfg_less_1(tile_last_col'range);
+        elsif cfg_index = C_TILE_ROWS and cfg_in_range = '1' then
+          tile_last_row <= cfg_less_1(tile_last_row'range);
+        elsif cfg_index = C_WIN_COLS and cfg_in_range = '1' then
+          win_last_col_q <= cfg_less_1(win_last_col_q'range);
+        elsif cfg_index = C_WIN_ROWS and cfg_in_range = '1' then
+          win_last_row_q <= cfg_less_1(win_last_row_q'range);
+        elsif cfg_index = C_PLANES and cfg_in_range = '1' then
+          last_plane <= cfg_less_1(last_plane'range);
         elsif cfg_index = C_THRESHOLD then
-          threshold_ok <= cfg_in_range;
-          threshold    <= cfg_word(G_MNCC_W - 1 downto 0);
+          threshold <= cfg_word(G_MNCC_W - 1 downto 0);
         elsif cfg_index = C_LEFT then
           left_x_lo <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_LEFT + 1 then
@@ -487,12 +471,8 @@ begin
       sweep_last_col <= resize(tile_last_col, C_COL_W) + (G_WINDOW - 1);
       sweep_last_row <= resize(tile_last_row, C_ROW_W) + (G_WINDOW - 1);
       if rst = '1' then
-        tile_cols_ok   <= '0';
-        tile_rows_ok   <= '0';
-        win_cols_ok    <= '0';
-        win_rows_ok    <= '0';
-        planes_ok      <= '0';
-        threshold_ok   <= '1';
+        range_ok              <= (others => '0');
+        range_ok(C_THRESHOLD) <= '1';
         threshold      <= (others => '0');
         win_last_col_q <= (others => '0'); -- nothing is loaded
         win_last_row_q <= (others => '0');
@@ -591,6 +571,42 @@ begin
         state_q     <= C_IDLE;
       end if;
 
+      -- Flags of the sample to come, so that no decoding lies before the table's address.
+      row_first <= load_done or (is_sweep and at_col_end and not at_tile_end);
+      if load_done = '1' or (is_sweep = '1' and at_last = '1') then
+        plane_first <= '1';
+      elsif is_sweep = '1' and at_col_end = '1' then
+        plane_first <= '0';
+      end if;
+      if load_done = '1' then
+        active <= '1';
+      elsif is_sweep = '1' and at_col_end = '1' then
+        active <= not at_tile_end;
+      elsif at_row_last = '1' then
+        active <= '0';
+      end if;
+
+      if sample_last = '1' then
+        since_last <= (others => '0');
+      elsif since_last /= C_FLUSH then
+        since_last <= since_last + 1;
+      end if;
+
+      if rst = '1' or halt = '1' then
+        row_first <= '0';
+        active    <= '0';
+        start_q   <= '0';
+      end if;
+      if rst = '1' then
+        abort_q    <= '0';
+        since_last <= (others => '0');
+      end if;
+    end if;
+  end process p_sequence;
+
+  p_counters : process (clk)
+  begin
+    if rising_edge(clk) then
       -- Counters come back to 0 by themselves at the end of load and of every plane. Whether they are at their ends is
       -- known with them, from registers, since all states and checks hang on it.
       if step = '1' then
@@ -632,39 +648,8 @@ begin
       elsif at_tile_end = '1' then
         plane_set <= (others => '0'); -- a legal table address
       end if;
-
-      -- Flags of the sample to come, so that no decoding lies before the table's address.
-      row_first <= load_done or (is_sweep and at_col_end and not at_tile_end);
-      if load_done = '1' or (is_sweep = '1' and at_last = '1') then
-        plane_first <= '1';
-      elsif is_sweep = '1' and at_col_end = '1' then
-        plane_first <= '0';
-      end if;
-      if load_done = '1' then
-        active <= '1';
-      elsif is_sweep = '1' and at_col_end = '1' then
-        active <= not at_tile_end;
-      elsif at_row_last = '1' then
-        active <= '0';
-      end if;
-
-      if sample_last = '1' then
-        since_last <= (others => '0');
-      elsif since_last /= C_FLUSH then
-        since_last <= since_last + 1;
-      end if;
-
-      if rst = '1' or halt = '1' then
-        row_first <= '0';
-        active    <= '0';
-        start_q   <= '0';
-      end if;
-      if rst = '1' then
-        abort_q    <= '0';
-        since_last <= (others => '0');
-      end if;
     end if;
-  end process p_sequence;
+  end process p_counters;
 
   s_pix_tready  <= pix_ready;
   win_last_col  <= std_logic_vector(win_last_col_q);
