@@ -16,7 +16,7 @@
 --              comes and is lost if there is no room. The verdict is never lost: it waits; a frame whose rx_dv rises
 --              while it waits is not received.
 --   Crossings: full_duplex and sending are synchronised here
---   Upsets   : hunting, in_frame and ended have no code that lasts: whatever they are, the end of rx_dv and of the
+--   Upsets   : before_sfd, in_frame and ended have no code that lasts: whatever they are, the end of rx_dv and of the
 --              verdict leads back to the start. tick flips with each clock, which shows that there is one
 --   Reset    : nothing shown; what is left of a frame in progress is not received
 --   Golden   : sw/golden/mac_rx.hpp
@@ -57,10 +57,10 @@ architecture rtl of mac_rx is
   signal dv     : std_logic;
   signal er     : std_logic;
 
-  signal hunting  : std_logic; -- rx_dv was 0, and no SFD since
-  signal after_5  : std_logic;
-  signal in_frame : std_logic; -- from the SFD until the verdict is on its way
-  signal ended    : std_logic; -- rx_dv was 0 in the frame, the verdict waits
+  signal before_sfd : std_logic; -- rx_dv was 0, and no SFD since
+  signal after_5    : std_logic;
+  signal in_frame   : std_logic; -- from the SFD until the verdict is on its way
+  signal ended      : std_logic; -- rx_dv was 0 in the frame, the verdict waits
   signal stop     : std_logic;
   signal high     : std_logic; -- the low nibble of a byte is in `low`
   signal low      : std_logic_vector(3 downto 0);
@@ -125,16 +125,16 @@ begin
       end if;
 
       after_5 <= dv and to_sl(nibble = "0101");
-      if hunting = '1' and dv = '1' and (own = '1' or (after_5 = '1' and nibble = "1101")) then
-        hunting  <= '0';
-        in_frame <= not own;
+      if before_sfd = '1' and dv = '1' and (own = '1' or (after_5 = '1' and nibble = "1101")) then
+        before_sfd <= '0';
+        in_frame   <= not own;
       end if;
       if dv = '1' and er = '1' and ended = '0' then
         error <= '1';
       end if;
       if dv = '0' and (in_frame = '0' or room = '1') then
-        hunting <= '1';
-        error   <= '0';
+        before_sfd <= '1';
+        error      <= '0';
       end if;
 
       -- In front of a frame: start values.
@@ -178,10 +178,10 @@ begin
       end if;
 
       if rst = '1' then
-        valid    <= '0';
-        hunting  <= '0';
-        in_frame <= '0';
-        ticked   <= '0';
+        valid      <= '0';
+        before_sfd <= '0';
+        in_frame   <= '0';
+        ticked     <= '0';
       end if;
     end if;
   end process p_frame;

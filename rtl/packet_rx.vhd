@@ -150,7 +150,7 @@ architecture rtl of packet_rx is
   -- Length of the IP packet's content, and its end.
   signal upper  : std_logic_vector(2 downto 0);
   signal length : unsigned(10 downto 0);
-  signal behind : std_logic_vector(4 downto 0); -- bit n: data is at least n bytes behind the first one past the end
+  signal past_end : std_logic_vector(4 downto 0); -- bit n: data is at least n bytes behind the first one past the end
 
   -- Sums.
   signal add_head   : std_logic;
@@ -408,13 +408,13 @@ begin
         length <= to_unsigned(8, 11);
       end if;
       if pos = length then
-        behind(0) <= '1';
+        past_end(0) <= '1';
       end if;
       if got = '1' then
-        behind(4 downto 1) <= behind(3 downto 0);
+        past_end(4 downto 1) <= past_end(3 downto 0);
       end if;
       if header = '1' then
-        behind <= (others => '0');
+        past_end <= (others => '0');
       end if;
     end if;
   end process p_length;
@@ -423,7 +423,7 @@ begin
   head_byte <= data when add_head = '1' else
                (others => '0');
   body_byte <= (7 downto 2 => add_minus3(1), 1 downto 0 => add_minus3(0)) when add_body = '0' else
-               data when behind(0) = '0' else
+               data when past_end(0) = '0' else
                (others => '0');
 
   p_sums : process (clk)
@@ -443,7 +443,7 @@ begin
   end process p_sums;
 
   -- Judgement ---------------------------------------------------------------------------------------------------------
-  ip_bad  <= to_sl(length(10 downto 3) = 0) or not behind(4) or
+  ip_bad  <= to_sl(length(10 downto 3) = 0) or not past_end(4) or
              (not arp and (bad_head or to_sl(head_sum(15 downto 0) /= x"ffff")));
   sum_bad <= bad_length or (to_sl(body_sum(15 downto 0) /= x"ffff") and (icmp or has_checksum));
 

@@ -37,7 +37,7 @@ architecture rtl of session_timer is
   signal ms_clock   : unsigned(clog2(G_CLK_KHZ) - 1 downto 0);
   signal ms_tick    : std_logic;
   signal silence_ms : unsigned(15 downto 0);
-  signal lapse      : std_logic; -- it has lasted as long as a session may be silent
+  signal time_up    : std_logic; -- it has lasted as long as a session may be silent
   signal over       : std_logic;
   signal no_rows_q  : std_logic;
   signal rows_clock : unsigned(7 downto 0);
@@ -60,8 +60,8 @@ begin
            & " outside 1..65535"
     severity failure;
 
-  lapse   <= ms_tick and to_sl(silence_ms = G_SESSION_MS - 1);
-  stuck   <= (over and ms_tick) or (not session and (lapse or silence_ms(10)));
+  time_up <= ms_tick and to_sl(silence_ms = G_SESSION_MS - 1);
+  stuck   <= (over and ms_tick) or (not session and (time_up or silence_ms(10)));
   tick_ms <= ms_tick;
   expired <= over;
 
@@ -71,7 +71,7 @@ begin
       if ms_tick = '1' then
         silence_ms <= silence_ms + 1;
       end if;
-      if lapse = '1' then
+      if time_up = '1' then
         silence_ms <= (others => '0');
         over       <= '1';
       end if;
