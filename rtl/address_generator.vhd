@@ -201,18 +201,18 @@ architecture rtl of address_generator is
     for k in C_POS_FRAC - G_WEIGHT_W to C_POS_FRAC - 1 loop
       v_fraction := v_fraction or position(k);
     end loop;
-    return to_bit(signed(hi & '0') >= floor_of(position) & v_fraction);
+    return to_sl(signed(hi & '0') >= floor_of(position) & v_fraction);
   end function at_most;
 
   function at_least (position : unsigned; lo : std_logic_vector) return std_logic is
   begin
-    return to_bit(floor_of(position) >= signed(lo));
+    return to_sl(floor_of(position) >= signed(lo));
   end function at_least;
 
   -- 0 <= floor and floor + 1 <= last: as unsigned numbers, negative positions are the largest.
   function is_loaded (position : unsigned; last : std_logic_vector) return std_logic is
   begin
-    return to_bit(position(31 downto C_POS_FRAC) < resize(unsigned(last), C_INT_W));
+    return to_sl(position(31 downto C_POS_FRAC) < resize(unsigned(last), C_INT_W));
   end function is_loaded;
 
 begin
@@ -325,7 +325,7 @@ begin
   -- Parity -----------------------------------------------------------------------------------------------------------
   -- Only words that a row in work has asked for: of the table, others may never have been written. (The words of the
   -- offsets come a clock earlier in the row, and word 0 behind them.)
-  word_reading <= to_bit(row(7 downto 2) /= "000000");
+  word_reading <= to_sl(row(7 downto 2) /= "000000");
 
   p_parity : process (clk)
     variable v_words : std_logic_vector(65 downto 0);
@@ -379,7 +379,7 @@ begin
 
   -- y parts ----------------------------------------------------------------------------------------------------------
   y_inside_now <= at_least(y_newer, y_lo) and at_most(y_newer, y_hi);
-  y_loaded_now <= is_loaded(y_newer, win_last_row) and to_bit(G_RECTIFIED = 0 or unsigned(fraction_of(y_newer)) = 0);
+  y_loaded_now <= is_loaded(y_newer, win_last_row) and to_sl(G_RECTIFIED = 0 or unsigned(fraction_of(y_newer)) = 0);
   -- Higher bits are 0 where the sample is loaded.
   y_half       <= y_newer(C_POS_FRAC + C_ROW_W - G_RECTIFIED downto C_POS_FRAC + 1 - G_RECTIFIED);
   -- One adder for both images, the left one in clock 5.

@@ -17,6 +17,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity arbiter is
   generic (
@@ -90,11 +91,9 @@ end entity arbiter;
 
 architecture rtl of arbiter is
 
-  constant C_PAIR_BYTES  : integer := (2 * G_PIX_W + 7) / 8;
-  constant C_CHUNK_PAIRS : integer := G_CHUNK_BYTES / C_PAIR_BYTES;
-  constant C_CELL_W      : integer := 1 + clog2(G_PLANES) + G_FRAC_W + G_MNCC_W;
-  constant C_CELL_BYTES  : integer := (C_CELL_W + 7) / 8;
-  constant C_CHUNK_CELLS : integer := G_CHUNK_BYTES / C_CELL_BYTES;
+  constant C_CHUNK_PAIRS : integer := chunk_pairs(G_CHUNK_BYTES, G_PIX_W);
+  constant C_CELL_W      : integer := cell_bits(G_PLANES, G_FRAC_W, G_MNCC_W);
+  constant C_CHUNK_CELLS : integer := chunk_cells(G_CHUNK_BYTES, C_CELL_W);
   constant C_CELLS       : integer := G_PLANE_COLS * G_PLANE_ROWS;
 
   function row_slots return integer is
@@ -209,7 +208,7 @@ architecture rtl of arbiter is
   signal starved        : std_logic;
   signal recovered      : std_logic;
   signal engine_wait    : std_logic;
-  signal events         : std_logic_vector(39 downto 0);
+  signal events         : std_logic_vector(C_EVENTS - 1 downto 0);
   signal ev_sent        : std_logic;
   signal ev_late        : std_logic;
   signal ev_excessive   : std_logic;
@@ -447,7 +446,7 @@ begin
 
   u_counters : entity work.counters
     generic map (
-      G_COUNT => 40
+      G_COUNT => C_EVENTS
     )
     port map (
       clk     => clk,
@@ -458,22 +457,24 @@ begin
       r_data  => c_data
     );
 
-  events(15 downto 0)  <= rx_events(15 downto 0);
-  events(17 downto 16) <= msg_events(17 downto 16);
-  events(18)           <= ev_sent;
-  events(19)           <= flipped(0);
-  events(20)           <= ev_late;
-  events(21)           <= ev_excessive;
-  events(28 downto 22) <= msg_events(28 downto 22);
-  events(29)           <= rx_events(16);
-  events(31 downto 30) <= msg_events(31 downto 30);
-  events(32)           <= rx_events(17);
-  events(33)           <= ev_deferred;
-  events(34)           <= msg_events(34);
-  events(35)           <= msg_events(35) or ev_recovered or flipped(1) or recovered;
-  events(36)           <= rx_events(18) or flipped(2);
-  events(38 downto 37) <= not ticked and not missing and (tick_ms & tick_ms);
-  events(39)           <= tile_failed;
+  -- Numbers of the protocol's counters: 0 to 15 are packet_rx's own, whose others follow them.
+  events(15 downto 0)                                  <= rx_events(15 downto 0);
+  events(C_EV_FOREIGN downto C_EV_BAD_MESSAGE)         <= msg_events(C_EV_FOREIGN downto C_EV_BAD_MESSAGE);
+  events(C_EV_SENT)                                    <= ev_sent;
+  events(C_EV_COLLISION)                               <= flipped(0);
+  events(C_EV_LATE)                                    <= ev_late;
+  events(C_EV_EXCESSIVE)                               <= ev_excessive;
+  events(C_EV_MAP_PACKET downto C_EV_SESSION)          <= msg_events(C_EV_MAP_PACKET downto C_EV_SESSION);
+  events(C_EV_BAD_SOURCE)                              <= rx_events(16);
+  events(C_EV_ANSWER downto C_EV_LIMITED)              <= msg_events(C_EV_ANSWER downto C_EV_LIMITED);
+  events(C_EV_RX_FRAGMENT)                             <= rx_events(17);
+  events(C_EV_DEFERRED)                                <= ev_deferred;
+  events(C_EV_UNREACHABLE)                             <= msg_events(C_EV_UNREACHABLE);
+  events(C_EV_RECOVERED)                               <= msg_events(C_EV_RECOVERED) or ev_recovered or flipped(1) or
+                                                          recovered;
+  events(C_EV_RESYNCHRONISED)                          <= rx_events(18) or flipped(2);
+  events(C_EV_TX_CLOCK_LOST downto C_EV_RX_CLOCK_LOST) <= not ticked and not missing and (tick_ms & tick_ms);
+  events(C_EV_TILE_FAILED)                             <= tile_failed;
 
   u_flips : entity work.cdc_sync
     generic map (

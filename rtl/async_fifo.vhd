@@ -157,15 +157,15 @@ begin
   -- other one stands still.
   w_hold  <= w_rst or w_request or w_answer or r_request_at_w;
   w_clear <= w_answer or r_request_at_w;
-  w_zero  <= to_bit(unsigned(w_gray) = 0);
+  w_zero  <= to_sl(unsigned(w_gray) = 0);
   r_hold  <= r_rst or r_request or r_answer or w_request_at_r;
   r_clear <= r_answer or w_request_at_r;
-  r_zero  <= to_bit(unsigned(r_gray) = 0);
+  r_zero  <= to_sl(unsigned(r_gray) = 0);
 
   -- Full: same place, other lap.
-  w_full <= to_bit(w_gray(C_TOP downto C_TOP - 1) = not r_gray_at_w(C_TOP downto C_TOP - 1)
+  w_full <= to_sl(w_gray(C_TOP downto C_TOP - 1) = not r_gray_at_w(C_TOP downto C_TOP - 1)
                    and w_gray(C_TOP - 2 downto 0) = r_gray_at_w(C_TOP - 2 downto 0));
-  r_empty <= to_bit(r_gray = w_gray_at_r);
+  r_empty <= to_sl(r_gray = w_gray_at_r);
 
   w_ready   <= not w_full and not w_hold;
   w_take    <= w_valid and not w_full and not w_hold;

@@ -176,12 +176,7 @@ architecture rtl of control is
   signal command_clear : std_logic;
 
   -- Registers, sizes less 1.
-  signal tile_cols_ok   : std_logic;
-  signal tile_rows_ok   : std_logic;
-  signal win_cols_ok    : std_logic;
-  signal win_rows_ok    : std_logic;
-  signal planes_ok      : std_logic;
-  signal threshold_ok   : std_logic;
+  signal range_ok       : std_logic_vector(C_THRESHOLD downto C_TILE_COLS); -- which of them hold what they may
   signal tile_last_col  : unsigned(clog2(G_PLANE_COLS) - 1 downto 0);
   signal tile_last_row  : unsigned(clog2(G_PLANE_ROWS) - 1 downto 0);
   signal win_last_col_q : unsigned(clog2(G_IMG_COLS) - 1 downto 0);
@@ -340,12 +335,12 @@ begin
            & " outside 1..125"
     severity failure;
 
-  is_idle   <= to_bit(state_q = C_IDLE);
-  is_load   <= to_bit(state_q = C_LOAD);
-  is_sweep  <= to_bit(state_q = C_SWEEP);
-  is_flush  <= to_bit(state_q = C_FLUSHING);
-  is_unload <= to_bit(state_q = C_UNLOAD);
-  is_drain  <= to_bit(state_q = C_DRAIN);
+  is_idle   <= to_sl(state_q = C_IDLE);
+  is_load   <= to_sl(state_q = C_LOAD);
+  is_sweep  <= to_sl(state_q = C_SWEEP);
+  is_flush  <= to_sl(state_q = C_FLUSHING);
+  is_unload <= to_sl(state_q = C_UNLOAD);
+  is_drain  <= to_sl(state_q = C_DRAIN);
 
   -- Register writes --------------------------------------------------------------------------------------------------
   -- In a register first, with what the address alone tells: checks and state come behind it.
@@ -358,14 +353,14 @@ begin
       if s_cfg_tvalid = '0' then
         cfg_word(2 downto 0) <= "000"; -- an upset alone, of these or of cfg_command, commands nothing
       end if;
-      cfg_command  <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
-      cfg_low      <= s_cfg_tvalid and to_bit(unsigned(s_cfg_tdata(47 downto 37)) = 0)
-                      and to_bit(unsigned(s_cfg_tdata(36 downto 32)) /= C_COMMAND);
-      cfg_middle   <= s_cfg_tvalid and not s_cfg_tdata(47) and to_bit(unsigned(s_cfg_tdata(46 downto 37)) /= 0);
+      cfg_command  <= s_cfg_tvalid and to_sl(unsigned(s_cfg_tdata(47 downto 32)) = C_COMMAND);
+      cfg_low      <= s_cfg_tvalid and to_sl(unsigned(s_cfg_tdata(47 downto 37)) = 0)
+                      and to_sl(unsigned(s_cfg_tdata(36 downto 32)) /= C_COMMAND);
+      cfg_middle   <= s_cfg_tvalid and not s_cfg_tdata(47) and to_sl(unsigned(s_cfg_tdata(46 downto 37)) /= 0);
       cfg_high     <= s_cfg_tvalid and s_cfg_tdata(47);
-      cfg_in_table <= to_bit(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS);
-      cfg_fits     <= to_bit(unsigned(s_cfg_tdata(31 downto 16)) = 0);
-      cfg_some     <= to_bit(unsigned(s_cfg_tdata(15 downto 0)) /= 0);
+      cfg_in_table <= to_sl(unsigned(s_cfg_tdata(46 downto 32)) < C_TABLE_WORDS);
+      cfg_fits     <= to_sl(unsigned(s_cfg_tdata(31 downto 16)) = 0);
+      cfg_some     <= to_sl(unsigned(s_cfg_tdata(15 downto 0)) /= 0);
       if rst = '1' then
         cfg_command <= '0';
         cfg_low     <= '0';
@@ -387,15 +382,15 @@ begin
                    else to_unsigned(G_IMG_ROWS, 16) when cfg_index(2 downto 0) = C_WIN_ROWS
                    else to_unsigned(G_PLANES, 16) when cfg_index(2 downto 0) = C_PLANES
                    else to_unsigned(2 ** G_MNCC_W - 1, 16);
-  cfg_in_range  <= cfg_fits and (cfg_some or to_bit(cfg_index(2 downto 0) = C_THRESHOLD))
-                   and to_bit(cfg_value <= cfg_limit);
+  cfg_in_range  <= cfg_fits and (cfg_some or to_sl(cfg_index(2 downto 0) = C_THRESHOLD))
+                   and to_sl(cfg_value <= cfg_limit);
   command_clear <= cfg_command and cfg_word(2);
   command_abort <= cfg_command and cfg_word(1);
   command_start <= cfg_command and cfg_word(0) and not cfg_word(1);
 
-  table_next  <= to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) = table_words);
+  table_next  <= to_sl(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) = table_words);
   table_ok    <= cfg_in_table
-                 and to_bit(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) <= table_words);
+                 and to_sl(resize(unsigned(cfg_word(46 downto 32)), C_TABLE_W + 1) <= table_words);
 
   -- A register more, as the table's blocks lie far apart. The first row is read long after the last write.
   p_table : process (clk)
@@ -410,7 +405,7 @@ begin
       cfg_parity  <= v_odd;
       table_we    <= cfg_table and table_ok;
       table_addr  <= cfg_word(C_TABLE_W + 31 downto 32);
-      offset_we   <= cfg_register and to_bit(cfg_index(4 downto 2) = C_OFFSETS / 4);
+      offset_we   <= cfg_register and to_sl(cfg_index(4 downto 2) = C_OFFSETS / 4);
       offset_addr <= cfg_word(33 downto 32);
       if rst = '1' then
         table_we  <= '0';
@@ -421,13 +416,13 @@ begin
 
   event_busy    <= not is_idle and (cfg_low or cfg_middle or cfg_high or command_start);
   event_address <= (cfg_table and not table_ok)
-                   or (cfg_register and to_bit(cfg_index = 7))
-                   or (cfg_register and to_bit(cfg_index >= 12 and cfg_index < C_LEFT))
-                   or (cfg_register and to_bit(cfg_index >= C_RIGHT + 4))
+                   or (cfg_register and to_sl(cfg_index = 7))
+                   or (cfg_register and to_sl(cfg_index >= 12 and cfg_index < C_LEFT))
+                   or (cfg_register and to_sl(cfg_index >= C_RIGHT + 4))
                    or (cfg_middle and is_idle);
 
-  config_bad   <= not (tile_cols_ok and tile_rows_ok and win_cols_ok and win_rows_ok and planes_ok and threshold_ok);
-  table_bad    <= to_bit(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
+  config_bad   <= to_sl(unsigned(not range_ok) /= 0);
+  table_bad    <= to_sl(resize(last_plane, C_PLANE_W + 1) >= table_words(C_TABLE_W downto 3));
   event_config <= command_start and is_idle and config_bad;
   event_table  <= command_start and is_idle and not config_bad and table_bad;
   start_ok     <= command_start and is_idle and not config_bad and not table_bad;
@@ -436,34 +431,23 @@ begin
   begin
     if rising_edge(clk) then
       if cfg_register = '1' then
-        if cfg_index = C_TILE_COLS then
-          tile_cols_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            tile_last_col <= cfg_less_1(tile_last_col'range);
+        for k in range_ok'range loop
+          if cfg_index = k then
+            range_ok(k) <= cfg_in_range;
           end if;
-        elsif cfg_index = C_TILE_ROWS then
-          tile_rows_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            tile_last_row <= cfg_less_1(tile_last_row'range);
-          end if;
-        elsif cfg_index = C_WIN_COLS then
-          win_cols_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            win_last_col_q <= cfg_less_1(win_last_col_q'range);
-          end if;
-        elsif cfg_index = C_WIN_ROWS then
-          win_rows_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            win_last_row_q <= cfg_less_1(win_last_row_q'range);
-          end if;
-        elsif cfg_index = C_PLANES then
-          planes_ok <= cfg_in_range;
-          if cfg_in_range = '1' then
-            last_plane <= cfg_less_1(last_plane'range);
-          end if;
+        end loop;
+        if cfg_index = C_TILE_COLS and cfg_in_range = '1' then
+          tile_last_col <= cfg_less_1(tile_last_col'range);
+        elsif cfg_index = C_TILE_ROWS and cfg_in_range = '1' then
+          tile_last_row <= cfg_less_1(tile_last_row'range);
+        elsif cfg_index = C_WIN_COLS and cfg_in_range = '1' then
+          win_last_col_q <= cfg_less_1(win_last_col_q'range);
+        elsif cfg_index = C_WIN_ROWS and cfg_in_range = '1' then
+          win_last_row_q <= cfg_less_1(win_last_row_q'range);
+        elsif cfg_index = C_PLANES and cfg_in_range = '1' then
+          last_plane <= cfg_less_1(last_plane'range);
         elsif cfg_index = C_THRESHOLD then
-          threshold_ok <= cfg_in_range;
-          threshold    <= cfg_word(G_MNCC_W - 1 downto 0);
+          threshold <= cfg_word(G_MNCC_W - 1 downto 0);
         elsif cfg_index = C_LEFT then
           left_x_lo <= cfg_word(C_INT_W - 1 downto 0);
         elsif cfg_index = C_LEFT + 1 then
@@ -488,12 +472,8 @@ begin
       sweep_last_col <= resize(tile_last_col, C_COL_W) + (G_WINDOW - 1);
       sweep_last_row <= resize(tile_last_row, C_ROW_W) + (G_WINDOW - 1);
       if rst = '1' then
-        tile_cols_ok   <= '0';
-        tile_rows_ok   <= '0';
-        win_cols_ok    <= '0';
-        win_rows_ok    <= '0';
-        planes_ok      <= '0';
-        threshold_ok   <= '1';
+        range_ok              <= (others => '0');
+        range_ok(C_THRESHOLD) <= '1';
         threshold      <= (others => '0');
         win_last_col_q <= (others => '0'); -- nothing is loaded
         win_last_row_q <= (others => '0');
@@ -505,14 +485,14 @@ begin
   lanes(0) <= '1';
 
   g_mask : for n in 1 to G_LANES - 1 generate
-    lanes(n) <= not at_set_end or to_bit(last_wide(1 downto 0) >= n) when G_LANES = 4
+    lanes(n) <= not at_set_end or to_sl(last_wide(1 downto 0) >= n) when G_LANES = 4
                 else not at_set_end or last_wide(0);
   end generate g_mask;
 
   -- Only windows below C_ROW_MIN can have rows that need padding.
   g_padding : if G_WINDOW < C_ROW_MIN generate
     row_last_col <= sweep_last_col when sweep_last_col >= C_ROW_MIN - 1 else to_unsigned(C_ROW_MIN - 1, C_COL_W);
-    at_row_last <= to_bit(col = sweep_last_col);
+    at_row_last <= to_sl(col = sweep_last_col);
   end generate g_padding;
 
   g_no_padding : if G_WINDOW >= C_ROW_MIN generate
@@ -531,21 +511,21 @@ begin
   last_wide   <= resize(last_plane, C_SET_W + C_PLANE_W + 2);
   last_set    <= last_wide(C_SET_W + C_LANE_W - 1 downto C_LANE_W);
   -- 'Not below' and the second comparison are for an upset bit: no tile sweeps more sets than the table has.
-  at_set_end  <= to_bit(plane_set >= last_set or plane_set = C_SETS - 1);
+  at_set_end  <= to_sl(plane_set >= last_set or plane_set = C_SETS - 1);
   at_tile_end <= is_sweep and at_last and at_set_end_q;
   step        <= pix_fire or is_sweep;
   load_done   <= pix_fire and at_last and s_pix_tlast;
   event_short <= pix_fire and s_pix_tlast and not at_last;
   event_long  <= pix_fire and at_last and not s_pix_tlast;
   sample_last <= active and at_row_end and at_row_last;
-  flushed     <= is_flush and to_bit(since_last = C_FLUSH);
+  flushed     <= is_flush and to_sl(since_last = C_FLUSH);
   tile_done   <= is_unload and map_last and not map_more;
   -- What cannot be unless a bit was upset: a state without a name, a map that ends before or after its last beat, or a
   -- word of table or offsets with wrong parity (beside a sweep, one of a tile that was dropped).
   upset_now   <= not (is_idle or is_load or is_sweep or is_flush or is_unload or is_drain)
                  or (is_unload and not map_more and not map_valid)
                  or (map_last and map_more and not abort_q) -- (a beat that an abort takes away is none)
-                 or ((is_sweep or is_flush) and to_bit(unsigned(word_error) /= 0));
+                 or ((is_sweep or is_flush) and to_sl(unsigned(word_error) /= 0));
   halt        <= command_abort or event_upset;
   -- Apart from where to, so that no chain of states lies before the register's enable.
   move        <= (is_idle and command_start)
@@ -592,48 +572,6 @@ begin
         state_q     <= C_IDLE;
       end if;
 
-      -- Counters come back to 0 by themselves at the end of load and of every plane. Whether they are at their ends is
-      -- known with them, from registers, since all states and checks hang on it.
-      if step = '1' then
-        if at_col_end = '1' then
-          col        <= (others => '0');
-          at_col_end <= one_col and not at_row_end;
-          if at_row_end = '1' then
-            row        <= (others => '0');
-            at_row_end <= '0'; -- of a plane to come: it has at least three rows
-          else
-            row        <= row + 1;
-            at_row_end <= to_bit(row = last_row_less_1);
-          end if;
-        else
-          col        <= col + 1;
-          at_col_end <= to_bit(col = last_col_less_1);
-        end if;
-      end if;
-      -- Limits of load are set up in idle, those of the sweep, which has at least three rows, when load is over.
-      if is_idle = '1' or load_done = '1' then
-        last_col_less_1 <= next_last_col - 1;
-        last_row_less_1 <= next_last_row - 1;
-      end if;
-      if is_idle = '1' then
-        one_col    <= to_bit(win_last_col_q = 0);
-        at_col_end <= to_bit(win_last_col_q = 0);
-        at_row_end <= to_bit(win_last_row_q = 0);
-      elsif load_done = '1' then
-        one_col    <= '0';
-      end if;
-      at_set_end_q <= at_set_end; -- a set takes many clocks
-      if is_sweep = '1' and at_last = '1' then
-        plane_set <= plane_set + 1;
-      end if;
-      if rst = '1' or is_idle = '1' then
-        col       <= (others => '0');
-        row       <= (others => '0');
-        plane_set <= (others => '0');
-      elsif at_tile_end = '1' then
-        plane_set <= (others => '0'); -- a legal table address
-      end if;
-
       -- Flags of the sample to come, so that no decoding lies before the table's address.
       row_first <= load_done or (is_sweep and at_col_end and not at_tile_end);
       if load_done = '1' or (is_sweep = '1' and at_last = '1') then
@@ -666,6 +604,53 @@ begin
       end if;
     end if;
   end process p_sequence;
+
+  p_counters : process (clk)
+  begin
+    if rising_edge(clk) then
+      -- Counters come back to 0 by themselves at the end of load and of every plane. Whether they are at their ends is
+      -- known with them, from registers, since all states and checks hang on it.
+      if step = '1' then
+        if at_col_end = '1' then
+          col        <= (others => '0');
+          at_col_end <= one_col and not at_row_end;
+          if at_row_end = '1' then
+            row        <= (others => '0');
+            at_row_end <= '0'; -- of a plane to come: it has at least three rows
+          else
+            row        <= row + 1;
+            at_row_end <= to_sl(row = last_row_less_1);
+          end if;
+        else
+          col        <= col + 1;
+          at_col_end <= to_sl(col = last_col_less_1);
+        end if;
+      end if;
+      -- Limits of load are set up in idle, those of the sweep, which has at least three rows, when load is over.
+      if is_idle = '1' or load_done = '1' then
+        last_col_less_1 <= next_last_col - 1;
+        last_row_less_1 <= next_last_row - 1;
+      end if;
+      if is_idle = '1' then
+        one_col    <= to_sl(win_last_col_q = 0);
+        at_col_end <= to_sl(win_last_col_q = 0);
+        at_row_end <= to_sl(win_last_row_q = 0);
+      elsif load_done = '1' then
+        one_col    <= '0';
+      end if;
+      at_set_end_q <= at_set_end; -- a set takes many clocks
+      if is_sweep = '1' and at_last = '1' then
+        plane_set <= plane_set + 1;
+      end if;
+      if rst = '1' or is_idle = '1' then
+        col       <= (others => '0');
+        row       <= (others => '0');
+        plane_set <= (others => '0');
+      elsif at_tile_end = '1' then
+        plane_set <= (others => '0'); -- a legal table address
+      end if;
+    end if;
+  end process p_counters;
 
   s_pix_tready  <= pix_ready;
   win_last_col  <= std_logic_vector(win_last_col_q);
@@ -710,7 +695,7 @@ begin
       v_odd  := '0';
       v_one  := '0';
       v_two  := '0';
-      v_four := to_bit(G_LANES = 4);
+      v_four := to_sl(G_LANES = 4);
       for n in 0 to G_LANES - 1 loop
         v_odd  := v_odd xor window_error(n);
         v_two  := v_two or (v_one and window_error(n));
@@ -724,7 +709,7 @@ begin
     end if;
   end process p_window;
 
-  sample_lost        <= to_bit(samples_lost /= 0);
+  sample_lost        <= to_sl(samples_lost /= 0);
   window_errors_next <= ('0' & window_errors_q) + samples_lost;
   event_window     <= sample_lost and not window_seen;
   cfg_event        <= event_config or event_table or event_address or event_busy;

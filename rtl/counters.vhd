@@ -69,9 +69,9 @@ begin
     severity failure;
 
   four       <= scan(C_INDEX_W - 1 downto 2);
-  move       <= to_bit(phase = 0) and to_bit(scan(1 downto 0) = 0);
-  write_low  <= to_bit(phase = 1);
-  write_high <= to_bit(phase = 2);
+  move       <= to_sl(phase = 0) and to_sl(scan(1 downto 0) = 0);
+  write_low  <= to_sl(phase = 1);
+  write_high <= to_sl(phase = 2);
   raddr      <= r_index(C_INDEX_W - 1 downto 0) when phase(1) = '1' else std_logic_vector(scan);
 
   -- Zeros go in, not out: so they cost nothing.
@@ -156,7 +156,7 @@ begin
   end process p_scan;
 
   -- Says that rdata belongs to r_index, where it is taken.
-  same    <= to_bit(r_index = index_q);
+  same    <= to_sl(r_index = index_q);
   r_valid <= have and same;
 
   p_read : process (clk)

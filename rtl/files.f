@@ -22,6 +22,7 @@ reset_filter.vhd
 ram_dc.vhd
 async_fifo.vhd
 eth_pkg.vhd
+link_pkg.vhd
 mac_rx.vhd
 mac_tx.vhd
 packet_rx.vhd
@@ -30,6 +31,16 @@ row_buffer.vhd
 map_buffer.vhd
 counters.vhd
 scheduler.vhd
+message_reader.vhd
+message_rules.vhd
+session_memory.vhd
+session_timer.vhd
+reply_limiter.vhd
+chunk_check.vhd
+map_sender.vhd
+info_rom.vhd
+reply_builder.vhd
+message_sequencer.vhd
 responder.vhd
 arbiter.vhd
 psweep_top.vhd

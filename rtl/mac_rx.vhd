@@ -15,9 +15,9 @@
 --   Contract : a beat shown holds until it is taken. The next byte comes 2 clocks later and is lost if there is no
 --              room. The verdict is never lost: it waits, and a frame whose rx_dv rises meanwhile is not received.
 --   Crossings: full_duplex and sending are synchronised here
---   Upsets   : no code of hunting, in_frame and ended lasts: the end of rx_dv and of the verdict leads back to the
---              start from each. tick flips with each clock and so shows that there is one
---   Reset    : nothing shown; the rest of a frame in progress is not received
+--   Upsets   : before_sfd, in_frame and ended have no code that lasts: whatever they are, the end of rx_dv and of the
+--              verdict leads back to the start. tick flips with each clock, which shows that there is one
+--   Reset    : nothing shown; what is left of a frame in progress is not received
 --   Golden   : sw/golden/mac_rx.hpp
 library ieee;
   use ieee.std_logic_1164.all;
@@ -56,10 +56,10 @@ architecture rtl of mac_rx is
   signal dv     : std_logic;
   signal er     : std_logic;
 
-  signal hunting  : std_logic; -- rx_dv was 0, and no SFD since
-  signal after_5  : std_logic;
-  signal in_frame : std_logic; -- from the SFD until the verdict is on its way
-  signal ended    : std_logic; -- rx_dv was 0 in the frame, the verdict waits
+  signal before_sfd : std_logic; -- rx_dv was 0, and no SFD since
+  signal after_5    : std_logic;
+  signal in_frame   : std_logic; -- from the SFD until the verdict is on its way
+  signal ended      : std_logic; -- rx_dv was 0 in the frame, the verdict waits
   signal stop     : std_logic;
   signal high     : std_logic; -- the low nibble of a byte is in `low`
   signal low      : std_logic_vector(3 downto 0);
@@ -104,12 +104,12 @@ begin
   room     <= not valid or m_ready;
   stop     <= in_frame and (ended or not dv);
   byte_end <= in_frame and not stop and high;
-  full     <= to_bit(count = C_MAX);
-  crc_good <= to_bit(crc = C_CRC_RESIDUE);
+  full     <= to_sl(count = C_MAX);
+  crc_good <= to_sl(crc = C_CRC_RESIDUE);
 
   -- The register has seen an odd nibble too, so what it said before that one was kept.
   wrong   <= not crc_good when high = '0' else not was_good;
-  verdict <= lost & error & long & to_bit(count(10 downto 6) = 0) & (high and wrong) & wrong;
+  verdict <= lost & error & long & to_sl(count(10 downto 6) = 0) & (high and wrong) & wrong;
 
   p_frame : process (clk)
   begin
@@ -123,17 +123,17 @@ begin
         valid <= '0';
       end if;
 
-      after_5 <= dv and to_bit(nibble = "0101");
-      if hunting = '1' and dv = '1' and (own = '1' or (after_5 = '1' and nibble = "1101")) then
-        hunting  <= '0';
-        in_frame <= not own;
+      after_5 <= dv and to_sl(nibble = "0101");
+      if before_sfd = '1' and dv = '1' and (own = '1' or (after_5 = '1' and nibble = "1101")) then
+        before_sfd <= '0';
+        in_frame   <= not own;
       end if;
       if dv = '1' and er = '1' and ended = '0' then
         error <= '1';
       end if;
       if dv = '0' and (in_frame = '0' or room = '1') then
-        hunting <= '1';
-        error   <= '0';
+        before_sfd <= '1';
+        error      <= '0';
       end if;
 
       -- In front of a frame: start values.
@@ -177,10 +177,10 @@ begin
       end if;
 
       if rst = '1' then
-        valid    <= '0';
-        hunting  <= '0';
-        in_frame <= '0';
-        ticked   <= '0';
+        valid      <= '0';
+        before_sfd <= '0';
+        in_frame   <= '0';
+        ticked     <= '0';
       end if;
     end if;
   end process p_frame;

@@ -195,17 +195,17 @@ begin
 
   -- Ends of the states. The limits of 60 bytes and of the slot time are reached by counting up, so that the ones among
   -- their bits tell them. A collision is seen 4 nibbles after its own: 116 = 128 - 16 + 4.
-  last_7   <= to_bit(pos(2 downto 0) = 6);
-  last_8   <= to_bit(pos(2 downto 0) = 7);
+  last_7   <= to_sl(pos(2 downto 0) = 6);
+  last_8   <= to_sl(pos(2 downto 0) = 7);
   last_16  <= last_8 and pos(3);
   length   <= f_length_0 when slot = '0' else f_length_1;
-  at_end   <= padding or to_bit(std_logic_vector(pos(11 downto 1)) = length);
+  at_end   <= padding or to_sl(std_logic_vector(pos(11 downto 1)) = length);
   at_60    <= minimum or (pos(6) and pos(5) and pos(4) and pos(3));
   at_late  <= late or (pos(6) and pos(5) and pos(4) and pos(2));
   all_up   <= data and at_end and at_60;
   hit      <= (preamble and last_16 and (collided or col)) or ((data or fcs) and col);
   slots    <= std_logic_vector(pos(16 downto 7)) xor random(9 downto 0);
-  waited   <= to_bit((slots and tried(9 downto 0)) = "0000000000");
+  waited   <= to_sl((slots and tried(9 downto 0)) = "0000000000");
   finish   <= (fcs and last_7 and not col) or (jam and last_8 and (late or tried(C_TRIES - 1))) or expired;
   restart  <= start or (preamble and last_16) or hit or all_up or (jam and last_8) or (backoff and waited) or expired;
 

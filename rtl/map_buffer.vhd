@@ -23,6 +23,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity map_buffer is
   generic (
@@ -79,7 +80,7 @@ architecture rtl of map_buffer is
   constant C_INDEX_W    : integer := clog2(G_CHUNK_CELLS);
   constant C_COUNT_W    : integer := clog2(G_CELLS + 1);
   constant C_CHUNK_W    : integer := clog2((G_CELLS + C_CHUNK - 1) / C_CHUNK + 1);
-  constant C_CELL_BYTES : integer := (G_CELL_W + 7) / 8;
+  constant C_CELL_BYTES : integer := cell_bytes(G_CELL_W);
 
   -- Read: off; the start address walks; cells leave. The codes differ in two bits.
   constant C_OFF  : std_logic_vector(2 downto 0) := "000";
@@ -155,7 +156,7 @@ begin
 
   -- Write ------------------------------------------------------------------------------------------------------------
   illegal   <= (busy_q xor filling xor complete_q) or (filling and complete_q)
-               or not to_bit(read_state = C_OFF or read_state = C_WALK or read_state = C_SEND);
+               or not to_sl(read_state = C_OFF or read_state = C_WALK or read_state = C_SEND);
   recovered <= illegal and not rst;
   forget    <= release_map or clear or illegal;
   drop      <= forget or (fail and filling);
@@ -199,7 +200,7 @@ begin
     room   <= '1';
     kept   <= (others => '0');
     w_addr <= std_logic_vector(count_q(C_ADDR_W - 1 downto 0));
-    exists <= to_bit(unsigned(f_chunk) < finished);
+    exists <= to_sl(unsigned(f_chunk) < finished);
   end generate g_whole;
 
   g_ring : if not C_WHOLE generate
@@ -207,9 +208,9 @@ begin
     signal used : unsigned(16 downto 0); -- finished chunks that are kept; negative if keep is ahead
   begin
     used   <= ('0' & finished) - ('0' & kept);
-    room   <= used(16) or to_bit(used(15 downto 0) < C_RING);
+    room   <= used(16) or to_sl(used(15 downto 0) < C_RING);
     w_addr <= std_logic_vector(addr);
-    exists <= to_bit(unsigned(f_chunk) < finished) and to_bit(unsigned(f_chunk) >= kept);
+    exists <= to_sl(unsigned(f_chunk) < finished) and to_sl(unsigned(f_chunk) >= kept);
 
     p_ring : process (clk)
     begin
@@ -244,10 +245,10 @@ begin
     );
 
   -- Read -------------------------------------------------------------------------------------------------------------
-  number_ok  <= to_bit(unsigned(f_chunk(C_CHUNK_W - 1 downto 0)) = number); -- it exists, so its number is no longer
-  last_chunk <= complete_q and to_bit(number = finished);
-  last_cell  <= to_bit(r_index = G_CHUNK_CELLS - 1) or (last_chunk and to_bit(r_index = w_index));
-  last_byte  <= to_bit(byte_n = C_CELL_BYTES - 1);
+  number_ok  <= to_sl(unsigned(f_chunk(C_CHUNK_W - 1 downto 0)) = number); -- it exists, so its number is no longer
+  last_chunk <= complete_q and to_sl(number = finished);
+  last_cell  <= to_sl(r_index = G_CHUNK_CELLS - 1) or (last_chunk and to_sl(r_index = w_index));
+  last_byte  <= to_sl(byte_n = C_CELL_BYTES - 1);
   load       <= cell_valid and (f_take or not valid_q);
   padded     <= std_logic_vector(resize(unsigned(cell_word), 8 * C_CELL_BYTES));
   f_ready    <= ready_q;
@@ -266,8 +267,8 @@ begin
   p_read : process (clk)
   begin
     if rising_edge(clk) then
-      ready_q    <= exists and to_bit(read_state = C_OFF) and not f_start;
-      cell_valid <= to_bit(read_state = C_SEND);
+      ready_q    <= exists and to_sl(read_state = C_OFF) and not f_start;
+      cell_valid <= to_sl(read_state = C_SEND);
 
       if load = '1' and last_byte = '1' then
         cell_valid <= '0';

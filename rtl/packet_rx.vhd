@@ -48,6 +48,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity packet_rx is
   generic (
@@ -148,7 +149,7 @@ architecture rtl of packet_rx is
   -- Length of the IP packet's content, and its end.
   signal upper  : std_logic_vector(2 downto 0);
   signal length : unsigned(10 downto 0);
-  signal behind : std_logic_vector(4 downto 0); -- bit n: data is at least n bytes behind the first one past the end
+  signal past_end : std_logic_vector(4 downto 0); -- bit n: data is at least n bytes behind the first one past the end
 
   -- Sums.
   signal add_head   : std_logic;
@@ -157,12 +158,8 @@ architecture rtl of packet_rx is
   signal restart    : std_logic;
   signal head_byte  : std_logic_vector(7 downto 0);
   signal body_byte  : std_logic_vector(7 downto 0);
-  signal head_add   : unsigned(9 downto 0);
-  signal body_add   : unsigned(9 downto 0);
-  signal head_sum   : unsigned(15 downto 0);
-  signal head_carry : std_logic;
-  signal body_sum   : unsigned(15 downto 0);
-  signal body_carry : std_logic;
+  signal head_sum   : unsigned(16 downto 0); -- the carry on the left
+  signal body_sum   : unsigned(16 downto 0);
 
   -- Judgement.
   signal ip_bad  : std_logic;
@@ -203,7 +200,7 @@ architecture rtl of packet_rx is
   -- Frame byte n, as place.
   function at_byte (code : unsigned; n : natural) return std_logic is
   begin
-    return to_bit(code = to_unsigned((n + 64 - C_HEADER) mod 64, 6));
+    return to_sl(code = to_unsigned((n + 64 - C_HEADER) mod 64, 6));
   end function at_byte;
 
 begin
@@ -258,45 +255,19 @@ begin
 
   -- Places of addresses: MAC 30 to 35 and 36 to 41, ARP 52 to 57; IP 56 to 63, ARP 58 to 61 and 4 to 7.
   sender <= place(5) and (place(4) or place(3) or place(2));
-  in_mac <= to_bit(place(5 downto 1) = 15 or place(5 downto 2) = 8 or place(5 downto 2) = 9 or
+  in_mac <= to_sl(place(5 downto 1) = 15 or place(5 downto 2) = 8 or place(5 downto 2) = 9 or
                    place(5 downto 1) = 20) or
-            (arp and to_bit(place(5 downto 2) = 13 or place(5 downto 1) = 28));
-  in_ip  <= to_bit(place(5 downto 1) = 29 or place(5 downto 1) = 30) or
-            (not arp and to_bit(place(5 downto 3) = 7)) or (arp and to_bit(place(5 downto 2) = 1));
+            (arp and to_sl(place(5 downto 2) = 13 or place(5 downto 1) = 28));
+  in_ip  <= to_sl(place(5 downto 1) = 29 or place(5 downto 1) = 30) or
+            (not arp and to_sl(place(5 downto 3) = 7)) or (arp and to_sl(place(5 downto 2) = 1));
   mac_at <= (place(2 downto 1) + unsigned'('0' & sender)) & place(0);
   ip_at  <= (place(1) xor (arp and place(5))) & place(0);
 
   -- Expected bytes ----------------------------------------------------------------------------------------------------
-  p_mac_byte : process (own_mac, mac_at)
-  begin
-    if mac_at = "110" then
-      mac_byte <= own_mac(47 downto 40);
-    elsif mac_at = "111" then
-      mac_byte <= own_mac(39 downto 32);
-    elsif mac_at(1 downto 0) = "00" then
-      mac_byte <= own_mac(31 downto 24);
-    elsif mac_at(1 downto 0) = "01" then
-      mac_byte <= own_mac(23 downto 16);
-    elsif mac_at(1 downto 0) = "10" then
-      mac_byte <= own_mac(15 downto 8);
-    else
-      mac_byte <= own_mac(7 downto 0);
-    end if;
-  end process p_mac_byte;
+  mac_byte <= mac_byte_of(own_mac, mac_at);
 
   -- All but the sender of ARP begin at a multiple of 4.
-  p_ip_byte : process (own_ip, ip_at)
-  begin
-    if ip_at = "00" then
-      ip_byte <= own_ip(31 downto 24);
-    elsif ip_at = "01" then
-      ip_byte <= own_ip(23 downto 16);
-    elsif ip_at = "10" then
-      ip_byte <= own_ip(15 downto 8);
-    else
-      ip_byte <= own_ip(7 downto 0);
-    end if;
-  end process p_ip_byte;
+  ip_byte  <= word_byte(own_ip, ip_at);
 
   length_byte <= "00000" & std_logic_vector(length(10 downto 8)) when place(0) = '0' else
                  std_logic_vector(length(7 downto 0));
@@ -354,16 +325,16 @@ begin
       want    <= want_next;
 
       near_q       <= near;
-      of_mac       <= to_bit(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
+      of_mac       <= to_sl(place(5 downto 3) = "011" or place(5 downto 2) = "1000");
       of_type      <= at_byte(place, 12) or at_byte(place, 13) or
-                      (arp and (to_bit(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
-                                to_bit(place(5 downto 2) = "0001")));
-      of_head      <= at_byte(place, 14) or at_byte(place, 16) or to_bit(place(5 downto 2) = "1111");
+                      (arp and (to_sl(place(5 downto 2) = "1011" or place(5 downto 2) = "1100") or
+                                to_sl(place(5 downto 2) = "0001")));
+      of_head      <= at_byte(place, 14) or at_byte(place, 16) or to_sl(place(5 downto 2) = "1111");
       of_fragment  <= at_byte(place, 20) or at_byte(place, 21);
-      of_kind      <= at_byte(place, 23) or (icmp and to_bit(place(5 downto 1) = "00000"));
-      of_port      <= udp and to_bit(place(5 downto 1) = "00001");
-      of_length    <= udp and to_bit(place(5 downto 1) = "00010");
-      of_checksum  <= udp and to_bit(place(5 downto 1) = "00011");
+      of_kind      <= at_byte(place, 23) or (icmp and to_sl(place(5 downto 1) = "00000"));
+      of_port      <= udp and to_sl(place(5 downto 1) = "00001");
+      of_length    <= udp and to_sl(place(5 downto 1) = "00010");
+      of_checksum  <= udp and to_sl(place(5 downto 1) = "00011");
       only_low     <= at_byte(place, 20) and not arp;
       only_high    <= at_byte(place, 16) and not arp;
       takes_length <= near and at_byte(place, 17);
@@ -374,27 +345,27 @@ begin
       of_last      <= at_byte(place, 11) or (arp and (at_byte(place, 27) or at_byte(place, 31))) or
                       (at_byte(place, 29) and not arp);
 
-      add_head   <= header and to_bit(place >= 44);
-      add_body   <= not near or to_bit(place = 46 or place = 47 or place >= 56 or place < 8);
-      add_minus3 <= (others => near and to_bit(place = 48 or place = 49));
+      add_head   <= header and to_sl(place >= 44);
+      add_body   <= not near or to_sl(place = 46 or place = 47 or place >= 56 or place < 8);
+      add_minus3 <= (others => near and to_sl(place = 48 or place = 49));
       if place(0) = '1' then
         add_minus3(0) <= '0';
       end if;
-      restart <= near and icmp and to_bit(place = 63);
+      restart <= near and icmp and to_sl(place = 63);
     end if;
   end process p_byte;
 
-  differs <= to_bit((data(7 downto 6) /= want(7 downto 6) and only_low = '0') or data(5 downto 3) /= want(5 downto 3) or
+  differs <= to_sl((data(7 downto 6) /= want(7 downto 6) and only_low = '0') or data(5 downto 3) /= want(5 downto 3) or
                     (data(2 downto 0) /= want(2 downto 0) and only_high = '0'));
 
-  bad_net <= to_bit(data(7 downto 5) = "111" or data = x"00" or data = x"7f");
+  bad_net <= to_sl(data(7 downto 5) = "111" or data = x"00" or data = x"7f");
 
   p_wrong : process (clk)
   begin
     if rising_edge(clk) then
       if got = '1' and near_q = '1' then
         not_mine     <= not_mine or (of_mac and differs);
-        not_all      <= not_all or (of_mac and to_bit(data /= x"ff"));
+        not_all      <= not_all or (of_mac and to_sl(data /= x"ff"));
         bad_type     <= bad_type or (of_type and differs);
         bad_head     <= bad_head or (of_head and differs);
         bad_fragment <= bad_fragment or (of_fragment and differs);
@@ -436,13 +407,13 @@ begin
         length <= to_unsigned(8, 11);
       end if;
       if pos = length then
-        behind(0) <= '1';
+        past_end(0) <= '1';
       end if;
       if got = '1' then
-        behind(4 downto 1) <= behind(3 downto 0);
+        past_end(4 downto 1) <= past_end(3 downto 0);
       end if;
       if header = '1' then
-        behind <= (others => '0');
+        past_end <= (others => '0');
       end if;
     end if;
   end process p_length;
@@ -451,37 +422,29 @@ begin
   head_byte <= data when add_head = '1' else
                (others => '0');
   body_byte <= (7 downto 2 => add_minus3(1), 1 downto 0 => add_minus3(0)) when add_body = '0' else
-               data when behind(0) = '0' else
+               data when past_end(0) = '0' else
                (others => '0');
-
-  -- The lowest bit brings the carry in.
-  head_add <= ('0' & head_sum(15 downto 8) & '1') + ('0' & unsigned(head_byte) & head_carry);
-  body_add <= ('0' & body_sum(15 downto 8) & '1') + ('0' & unsigned(body_byte) & body_carry);
 
   p_sums : process (clk)
   begin
     if rising_edge(clk) then
       if got = '1' then
-        head_sum   <= head_sum(7 downto 0) & head_add(8 downto 1);
-        head_carry <= head_add(9);
-        body_sum   <= body_sum(7 downto 0) & body_add(8 downto 1);
-        body_carry <= body_add(9);
+        head_sum <= checksum_add(head_sum, head_byte);
+        body_sum <= checksum_add(body_sum, body_byte);
       end if;
       if rst = '1' or verdict = '1' then
-        head_sum   <= (others => '0');
-        head_carry <= '0';
+        head_sum <= (others => '0');
       end if;
       if rst = '1' or verdict = '1' or restart = '1' then
-        body_sum   <= (others => '0');
-        body_carry <= '0';
+        body_sum <= (others => '0');
       end if;
     end if;
   end process p_sums;
 
   -- Judgement ---------------------------------------------------------------------------------------------------------
-  ip_bad  <= to_bit(length(10 downto 3) = 0) or not behind(4) or
-             (not arp and (bad_head or to_bit(head_sum /= x"ffff")));
-  sum_bad <= bad_length or (to_bit(body_sum /= x"ffff") and (icmp or has_checksum));
+  ip_bad  <= to_sl(length(10 downto 3) = 0) or not past_end(4) or
+             (not arp and (bad_head or to_sl(head_sum(15 downto 0) /= x"ffff")));
+  sum_bad <= bad_length or (to_sl(body_sum(15 downto 0) /= x"ffff") and (icmp or has_checksum));
 
   p_outcome : process (data, half_duplex, not_mine, not_all, bad_type, ip_bad, bad_source, arp, icmp, bad_fragment,
                        bad_kind, sum_bad, closed, room)
@@ -543,14 +506,14 @@ begin
 
   -- Ring --------------------------------------------------------------------------------------------------------------
   store    <= fire and not s_last;
-  crossing <= store and to_bit(pos(8 downto 0) = C_FIRST(8 downto 0));
+  crossing <= store and to_sl(pos(8 downto 0) = C_FIRST(8 downto 0));
   used     <= write_head - read_head;
-  broken   <= used(C_RING_W) and to_bit(used(C_RING_W - 1 downto 0) /= 0);
+  broken   <= used(C_RING_W) and to_sl(used(C_RING_W - 1 downto 0) /= 0);
   room_now <= not full and (near or room) when crossing = '1' else -- near: the first granule
               room;
 
   taken_now <= "00" when near = '1' else taken;
-  full      <= used(C_RING_W) or (to_bit(used(C_RING_W - 1 downto 1) = C_RING_END) and
+  full      <= used(C_RING_W) or (to_sl(used(C_RING_W - 1 downto 1) = C_RING_END) and
                                   (taken_now(1) or (taken_now(0) and used(0))));
 
   p_ring : process (clk)
@@ -567,7 +530,7 @@ begin
         read_head <= read_head + unsigned(info_read(14 downto 13));
       end if;
       -- info_read follows read_head by one clock.
-      shown <= to_bit(used /= 0) and not m_done;
+      shown <= to_sl(used /= 0) and not m_done;
       if rst = '1' or broken = '1' or stale = '1' then
         room       <= '0';
         write_head <= (others => '0');

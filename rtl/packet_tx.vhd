@@ -31,6 +31,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity packet_tx is
   generic (
@@ -134,9 +135,7 @@ architecture rtl of packet_tx is
   signal take   : std_logic;
   signal step   : std_logic;
   signal addend : std_logic_vector(7 downto 0);
-  signal total  : unsigned(9 downto 0);
-  signal sum    : unsigned(15 downto 0);
-  signal carry  : std_logic;
+  signal sum    : unsigned(16 downto 0); -- the carry on the left
 
   -- Slots.
   signal levels    : std_logic_vector(2 downto 0);
@@ -166,15 +165,15 @@ begin
   icmp    <= kind(0);
   take    <= paying and p_valid;
   p_ready <= paying;
-  last    <= to_bit(place = 41) or (icmp and to_bit(place = 37)); -- the ICMP payload begins at 38
-  finish  <= last and to_bit(round = 3);
+  last    <= to_sl(place = 41) or (icmp and to_sl(place = 37)); -- the ICMP payload begins at 38
+  finish  <= last and to_sl(round = 3);
 
   p_control : process (clk)
   begin
     if rising_edge(clk) then
-      turning <= (s_start and to_bit(s_kind = "00")) or (take and p_last);
+      turning <= (s_start and to_sl(s_kind = C_FRAME_ARP)) or (take and p_last);
       if s_start = '1' then
-        paying <= to_bit(s_kind /= "00");
+        paying <= to_sl(s_kind /= C_FRAME_ARP);
         kind   <= s_kind;
         bank   <= s_bank;
         size   <= to_unsigned(42, 11);
@@ -221,38 +220,11 @@ begin
                  std_logic_vector(lengths(7 downto 0));
 
   -- Frame bytes 6 and, in ARP, 22.
-  p_mac_byte : process (own_mac, place)
-  begin
-    if place(2 downto 0) = "110" then
-      mac_byte <= own_mac(47 downto 40);
-    elsif place(2 downto 0) = "111" then
-      mac_byte <= own_mac(39 downto 32);
-    elsif place(1 downto 0) = "00" then
-      mac_byte <= own_mac(31 downto 24);
-    elsif place(1 downto 0) = "01" then
-      mac_byte <= own_mac(23 downto 16);
-    elsif place(1 downto 0) = "10" then
-      mac_byte <= own_mac(15 downto 8);
-    else
-      mac_byte <= own_mac(7 downto 0);
-    end if;
-  end process p_mac_byte;
+  mac_byte <= mac_byte_of(own_mac, place(2 downto 0));
 
   -- Frame bytes 26 or, in ARP, 28.
   ip_place <= (place(1) xor not arp) & place(0);
-
-  p_ip_byte : process (own_ip, ip_place)
-  begin
-    if ip_place = "00" then
-      ip_byte <= own_ip(31 downto 24);
-    elsif ip_place = "01" then
-      ip_byte <= own_ip(23 downto 16);
-    elsif ip_place = "10" then
-      ip_byte <= own_ip(15 downto 8);
-    else
-      ip_byte <= own_ip(7 downto 0);
-    end if;
-  end process p_ip_byte;
+  ip_byte  <= word_byte(own_ip, ip_place);
 
   -- Zero where nothing else is said. Type 3, code 3: port unreachable.
   p_fixed_byte : process (place, kind, arp, udp)
@@ -289,13 +261,13 @@ begin
     elsif place = 34 then
       if udp = '1' then
         fixed_byte <= std_logic_vector(C_PORT(15 downto 8));
-      elsif kind = "11" then
+      elsif kind = C_FRAME_CLOSED then
         fixed_byte <= x"03";
       end if;
     elsif place = 35 then
       if udp = '1' then
         fixed_byte <= std_logic_vector(C_PORT(7 downto 0));
-      elsif kind = "11" then
+      elsif kind = C_FRAME_CLOSED then
         fixed_byte <= x"03";
       end if;
     elsif place >= 40 then
@@ -326,30 +298,30 @@ begin
 
   -- Round 1 writes the checksum of UDP or ICMP, round 3 that of IP.
   at_checksum <= round(0) and not arp and
-                 ((round(1) and to_bit(place(5 downto 1) = 12)) or
-                  (not round(1) and ((udp and to_bit(place(5 downto 1) = 20)) or
-                                     (not udp and to_bit(place(5 downto 1) = 18)))));
+                 ((round(1) and to_sl(place(5 downto 1) = 12)) or
+                  (not round(1) and ((udp and to_sl(place(5 downto 1) = 20)) or
+                                     (not udp and to_sl(place(5 downto 1) = 18)))));
 
   p_way : process (clk)
   begin
     if rising_edge(clk) then
       way_step     <= walking and not rst;
-      way_we       <= walking and not rst and (to_bit(round = 0) or at_checksum);
+      way_we       <= walking and not rst and (to_sl(round = 0) or at_checksum);
       way_place    <= place;
       way_checksum <= at_checksum;
       way_no_zero  <= not round(1);
-      way_clear    <= walking and to_bit(round = 2 and place = 0);
+      way_clear    <= walking and to_sl(round = 2 and place = 0);
       if round = 0 then
-        way_add <= (udp and to_bit(place >= 14 and place <= 39)) or
-                   (kind(1) and kind(0) and to_bit(place(5 downto 1) = 17));
+        way_add <= (udp and to_sl(place >= 14 and place <= 39)) or
+                   (kind(1) and kind(0) and to_sl(place(5 downto 1) = 17));
       else
-        way_add <= to_bit(round = 2 and place >= 14 and place <= 33 and place /= 24 and place /= 25);
+        way_add <= to_sl(round = 2 and place >= 14 and place <= 33 and place /= 24 and place /= 25);
       end if;
 
       if arp = '1' then
-        way_peer <= to_bit(place <= 5 or place >= 32);
+        way_peer <= to_sl(place <= 5 or place >= 32);
       else
-        way_peer <= to_bit(place <= 5 or (place >= 30 and place <= 33) or place = 36 or place = 37);
+        way_peer <= to_sl(place <= 5 or (place >= 30 and place <= 33) or place = 36 or place = 37);
       end if;
       if place(5 downto 1) = 3 or place(5 downto 2) = 2 or
          (arp = '1' and (place(5 downto 1) = 11 or place(5 downto 2) = 6)) then
@@ -369,7 +341,7 @@ begin
   -- round 1 the fixed byte stays: 0xffff for UDP, zero for ICMP.
   data <= p_data when paying = '1' else
           peer_byte when way_peer = '1' and way_checksum = '0' else
-          way_byte when way_checksum = '0' or (way_no_zero = '1' and sum = x"ffff") else
+          way_byte when way_checksum = '0' or (way_no_zero = '1' and sum(15 downto 0) = x"ffff") else
           std_logic_vector(not sum(15 downto 8));
 
   ram_we    <= take or way_we;
@@ -382,18 +354,15 @@ begin
   step   <= take or (turning and size(0)) or way_step;
   addend <= data when paying = '1' or way_add = '1' else
             (others => '0');
-  total  <= ('0' & sum(15 downto 8) & '1') + ('0' & unsigned(addend) & carry);
 
   p_sum : process (clk)
   begin
     if rising_edge(clk) then
       if step = '1' then
-        sum   <= sum(7 downto 0) & total(8 downto 1);
-        carry <= total(9);
+        sum <= checksum_add(sum, addend);
       end if;
       if busy = '0' or way_clear = '1' then
-        sum   <= (others => '0');
-        carry <= '0';
+        sum <= (others => '0');
       end if;
     end if;
   end process p_sum;
@@ -436,10 +405,10 @@ begin
         end if;
       end if;
       done_seen    <= done;
-      ev_sent      <= (change(0) or change(1)) and to_bit(result = "00");
-      ev_excessive <= (change(0) or change(1)) and to_bit(result = "01");
-      ev_late      <= (change(0) or change(1)) and to_bit(result = "10");
-      ev_deferred  <= (change(0) or change(1)) and to_bit(result = "11");
+      ev_sent      <= (change(0) or change(1)) and to_sl(result = "00");
+      ev_excessive <= (change(0) or change(1)) and to_sl(result = "01");
+      ev_late      <= (change(0) or change(1)) and to_sl(result = "10");
+      ev_deferred  <= (change(0) or change(1)) and to_sl(result = "11");
       if rst = '1' then
         slot <= '0';
       end if;

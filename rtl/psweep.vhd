@@ -316,7 +316,7 @@ begin
     signal lane_row_first : std_logic;
   begin
 
-    lane_we        <= table_we and to_bit(table_wide(4 downto 3) mod G_LANES = lane);
+    lane_we        <= table_we and to_sl(table_wide(4 downto 3) mod G_LANES = lane);
     lane_valid     <= sweep_valid and sweep_lanes(lane);
     lane_row_first <= sweep_row_first and sweep_lanes(lane);
 

@@ -77,9 +77,14 @@ package psweep_pkg is
   function deep_part (depth, n : integer) return integer;
   function deep_start (depth, n : integer) return integer;
   function deep_parts (depth : integer) return positive;
+  -- Bit n: the address is not in a part before n. A part starts at a multiple of the size of the one before it, so the
+  -- few bits above that tell. The bit above the last part is '0'.
+  function deep_reached (address : std_logic_vector; depth : integer) return std_logic_vector;
+  -- The word of the last part that is reached.
+  function deep_word (words, reached : std_logic_vector; width : integer) return std_logic_vector;
 
   -- true is '1'
-  function to_bit (b : boolean) return std_logic;
+  function to_sl (b : boolean) return std_logic;
 
 end package psweep_pkg;
 
@@ -188,12 +193,37 @@ package body psweep_pkg is
     return v_count;
   end function deep_parts;
 
-  function to_bit (b : boolean) return std_logic is
+  function deep_reached (address : std_logic_vector; depth : integer) return std_logic_vector is
+    constant C_PARTS   : positive := deep_parts(depth);
+    variable v_reached : std_logic_vector(C_PARTS downto 0);
+  begin
+    v_reached    := (others => '0');
+    v_reached(0) := '1';
+    for i in 1 to C_PARTS - 1 loop
+      v_reached(i) := to_sl(unsigned(address(address'high downto clog2(deep_part(depth, i - 1))))
+                            >= deep_start(depth, i) / deep_part(depth, i - 1));
+    end loop;
+    return v_reached;
+  end function deep_reached;
+
+  function deep_word (words, reached : std_logic_vector; width : integer) return std_logic_vector is
+    variable v_word : std_logic_vector(width - 1 downto 0);
+  begin
+    v_word := words(width - 1 downto 0);
+    for i in 1 to reached'high - 1 loop
+      if reached(i) = '1' then
+        v_word := words((i + 1) * width - 1 downto i * width);
+      end if;
+    end loop;
+    return v_word;
+  end function deep_word;
+
+  function to_sl (b : boolean) return std_logic is
   begin
     if b then
       return '1';
     end if;
     return '0';
-  end function to_bit;
+  end function to_sl;
 
 end package body psweep_pkg;

@@ -31,36 +31,9 @@ end entity ram_2r;
 
 architecture rtl of ram_2r is
 
-  constant C_ADDR_W : integer := clog2(G_DEPTH);
-  constant C_PARTS  : integer := deep_parts(G_DEPTH);
+  constant C_PARTS : integer := deep_parts(G_DEPTH);
 
   subtype t_parts is std_logic_vector(C_PARTS downto 0);
-
-  -- Bit n: the address is not in a part before n (see ram_deep).
-  function behind (address : std_logic_vector(C_ADDR_W - 1 downto 0)) return std_logic_vector is
-    variable v_behind : t_parts;
-  begin
-    v_behind    := (others => '0');
-    v_behind(0) := '1';
-    for i in 1 to C_PARTS - 1 loop
-      v_behind(i) := to_bit(unsigned(address(address'high downto clog2(deep_part(G_DEPTH, i - 1))))
-                            >= deep_start(G_DEPTH, i) / deep_part(G_DEPTH, i - 1));
-    end loop;
-    return v_behind;
-  end function behind;
-
-  -- The word of the last part that the address is not before.
-  function pick (words : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0); part : t_parts) return std_logic_vector is
-    variable v_word : std_logic_vector(G_DATA_W - 1 downto 0);
-  begin
-    v_word := words(G_DATA_W - 1 downto 0);
-    for i in 1 to C_PARTS - 1 loop
-      if part(i) = '1' then
-        v_word := words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
-      end if;
-    end loop;
-    return v_word;
-  end function pick;
 
   signal a_now   : t_parts;
   signal a_part  : t_parts;
@@ -90,7 +63,7 @@ begin
            & " below 1"
     severity failure;
 
-  a_now <= behind(a_addr);
+  a_now <= deep_reached(a_addr, G_DEPTH);
 
   g_parts : for i in 0 to C_PARTS - 1 generate
     constant C_SIZE   : integer := deep_part(G_DEPTH, i);
@@ -150,7 +123,7 @@ begin
   begin
     if rising_edge(clk) then
       a_part   <= a_now;
-      b_part   <= behind(b_addr);
+      b_part   <= deep_reached(b_addr, G_DEPTH);
       a_shown  <= a_words;
       b_shown  <= b_words;
       a_chosen <= a_part;
@@ -158,8 +131,8 @@ begin
     end if;
   end process p_output;
 
-  a_rdata <= pick(a_shown, a_chosen);
-  b_rdata <= pick(b_shown, b_chosen);
+  a_rdata <= deep_word(a_shown, a_chosen, G_DATA_W);
+  b_rdata <= deep_word(b_shown, b_chosen, G_DATA_W);
 
   -- synthesis translate_off
   p_rules : process (clk)

@@ -37,29 +37,13 @@ architecture rtl of ram_deep is
 
   constant C_PARTS : integer := deep_parts(G_DEPTH);
 
-  subtype t_address is std_logic_vector(clog2(G_DEPTH) - 1 downto 0);
-
   subtype t_parts is std_logic_vector(C_PARTS downto 0);
 
-  -- Bit n: the address is not in a part before n. A part starts at a multiple of the size of the one before it, so the
-  -- few bits above that tell. The bit above the last part is '0'.
-  function behind (address : t_address) return std_logic_vector is
-    variable v_behind : t_parts;
-  begin
-    v_behind    := (others => '0');
-    v_behind(0) := '1';
-    for i in 1 to C_PARTS - 1 loop
-      v_behind(i) := to_bit(unsigned(address(address'high downto clog2(deep_part(G_DEPTH, i - 1))))
-                            >= deep_start(G_DEPTH, i) / deep_part(G_DEPTH, i - 1));
-    end loop;
-    return v_behind;
-  end function behind;
-
-  signal w_behind : t_parts;
-  signal r_behind : t_parts;
+  signal w_reached : t_parts;
+  signal r_reached : t_parts;
   -- What the parts show, with latency 2 from their output registers.
-  signal words    : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
-  signal chosen   : t_parts;
+  signal words     : std_logic_vector(C_PARTS * G_DATA_W - 1 downto 0);
+  signal chosen    : t_parts;
 
 begin
 
@@ -92,7 +76,7 @@ begin
            & " outside 1..2"
     severity failure;
 
-  w_behind <= behind(waddr);
+  w_reached <= deep_reached(waddr, G_DEPTH);
 
   g_parts : for i in 0 to C_PARTS - 1 generate
     constant C_SIZE   : integer := deep_part(G_DEPTH, i);
@@ -101,7 +85,7 @@ begin
     signal we_part : std_logic;
   begin
 
-    we_part <= we and w_behind(i) and not w_behind(i + 1);
+    we_part <= we and w_reached(i) and not w_reached(i + 1);
 
     g_one : if not C_SPLIT generate
 
@@ -160,12 +144,12 @@ begin
   p_part : process (clk)
   begin
     if rising_edge(clk) then
-      r_behind <= behind(raddr);
+      r_reached <= deep_reached(raddr, G_DEPTH);
     end if;
   end process p_part;
 
   g_direct : if G_LATENCY = 1 generate
-    chosen <= r_behind;
+    chosen <= r_reached;
   end generate g_direct;
 
   g_output_register : if G_LATENCY /= 1 generate
@@ -173,20 +157,12 @@ begin
     p_chosen : process (clk)
     begin
       if rising_edge(clk) then
-        chosen <= r_behind;
+        chosen <= r_reached;
       end if;
     end process p_chosen;
 
   end generate g_output_register;
 
-  p_pick : process (words, chosen)
-  begin
-    rdata <= words(G_DATA_W - 1 downto 0);
-    for i in 1 to C_PARTS - 1 loop
-      if chosen(i) = '1' then
-        rdata <= words((i + 1) * G_DATA_W - 1 downto i * G_DATA_W);
-      end if;
-    end loop;
-  end process p_pick;
+  rdata <= deep_word(words, chosen, G_DATA_W);
 
 end architecture rtl;

@@ -115,7 +115,7 @@ begin
         constant C_PART_W : integer := clog2(C_REST) * boolean'pos(C_SHORT) + C_BLOCK_W * boolean'pos(not C_SHORT);
       begin
 
-        we_part <= we and to_bit(unsigned(waddr(waddr'high downto C_BLOCK_W)) = i);
+        we_part <= we and to_sl(unsigned(waddr(waddr'high downto C_BLOCK_W)) = i);
 
         u_part : entity work.ram_sdp
           generic map (G_DATA_W => C_LOW_W, G_DEPTH => 2 ** C_PART_W, G_LATENCY => 1)

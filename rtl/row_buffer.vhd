@@ -29,6 +29,7 @@ library ieee;
   use ieee.std_logic_1164.all;
   use ieee.numeric_std.all;
   use work.psweep_pkg.all;
+  use work.link_pkg.all;
 
 entity row_buffer is
   generic (
@@ -75,7 +76,7 @@ end entity row_buffer;
 architecture rtl of row_buffer is
 
   constant C_PAIR_W     : integer := 2 * G_PIX_W;
-  constant C_PAIR_BYTES : integer := (C_PAIR_W + 7) / 8;
+  constant C_PAIR_BYTES : integer := pair_bytes(G_PIX_W);
   constant C_DEPTH      : integer := G_SLOTS * G_CHUNK_PAIRS;
   constant C_ADDR_W     : integer := clog2(C_DEPTH);
   constant C_SLOT_W     : integer := clog2(G_SLOTS);
@@ -185,8 +186,8 @@ begin
   wipe      <= clear or illegal or strayed or (fail and (running or (out_valid and not staged_q)));
   base      <= std_logic_vector(base_q);
   received  <= std_logic_vector(stored);
-  left_one  <= to_bit(left = 1);
-  clear_end <= to_bit(left(C_SLOT_W - 1 downto 0) = 1);
+  left_one  <= to_sl(left = 1);
+  clear_end <= to_sl(left(C_SLOT_W - 1 downto 0) = 1);
   next_slot <= (others => '0') when base_slot = G_SLOTS - 1 else base_slot + 1;
 
   p_tile : process (clk)
@@ -194,8 +195,8 @@ begin
     if rising_edge(clk) then
       -- Of a full chunk: r_addr and base_slot go through a tile apart. The low bits tell slots apart.
       strayed  <= chunk_end and not left_one and not rst
-                  and to_bit(r_addr(C_SLOT_W - 1 downto 0) /= base_slot + (C_LAST mod 2 ** C_SLOT_W));
-      complete <= active and (to_bit(stored = chunks) or to_bit(stored = G_SLOTS));
+                  and to_sl(r_addr(C_SLOT_W - 1 downto 0) /= base_slot + (C_LAST mod 2 ** C_SLOT_W));
+      complete <= active and (to_sl(stored = chunks) or to_sl(stored = G_SLOTS));
       if go = '1' and staged_q = '1' then
         staged_q <= '0';
         running  <= '1';
@@ -252,7 +253,7 @@ begin
   w_new      <= new_q;
   w_repeated <= repeated_q;
   commit     <= w_commit and new_q and active;
-  pair_full  <= w_valid and to_bit(byte_n = C_PAIR_BYTES - 1);
+  pair_full  <= w_valid and to_sl(byte_n = C_PAIR_BYTES - 1);
 
   p_write : process (clk)
   begin
@@ -262,7 +263,7 @@ begin
         index_q    <= w_chunk(C_SLOT_W - 1 downto 0);
         distance_q <= distance(C_SLOT_W - 1 downto 0);
         below_q    <= distance(16);
-        window_q   <= active and to_bit(distance < G_SLOTS) and to_bit(unsigned(w_chunk) < chunks);
+        window_q   <= active and to_sl(distance < G_SLOTS) and to_sl(unsigned(w_chunk) < chunks);
       end if;
       -- base_slot still belongs to the base of the clock before: no chunk ends in the clock of w_check.
       if check_q = '1' then
@@ -363,13 +364,13 @@ begin
   p_status : process (clk)
   begin
     if rising_edge(clk) then
-      b_outside <= not active or to_bit(unsigned('0' & b_index) >= C_BITS);
+      b_outside <= not active or to_sl(unsigned('0' & b_index) >= C_BITS);
       b_bit     <= read_bit(0) and not b_outside;
     end if;
   end process p_status;
 
   -- Output -----------------------------------------------------------------------------------------------------------
-  chunk_last <= to_bit(r_addr >= C_LAST) or left_one;
+  chunk_last <= to_sl(r_addr >= C_LAST) or left_one;
   -- The bits have one write port, no check may meet a change, and the bitmap is one picture.
   issue      <= running and here and (m_tready or not out_valid)
                 and not (chunk_last and (w_check or w_commit or b_hold));

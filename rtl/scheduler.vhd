@@ -96,9 +96,9 @@ begin
   recovered   <= out_abort and not out_clear;
   run_tile    <= tile_q;
   cfg_tvalid  <= t_valid or out_job or out_start or out_abort;
-  is_loading  <= to_bit(state = C_LOADING);
-  is_running  <= to_bit(state = C_RUNNING);
-  word_last   <= to_bit(word = C_WORDS);
+  is_loading  <= to_sl(state = C_LOADING);
+  is_running  <= to_sl(state = C_RUNNING);
+  word_last   <= to_sl(word = C_WORDS);
   word_over   <= word(4) and (word(3) or word(2) or (word(1) and word(0)));
   launch      <= staged and complete and not engine_busy;
   -- An engine that is busy, or not, as it must not be, for 16 clocks on end; or a buffer has lost what runs.

@@ -433,9 +433,9 @@ begin
     end if;
   end process p_count;
 
-  s1_wide   <= to_bit(s1_before = G_WINDOW);
-  s1_cell   <= s1_valid and to_bit(s1_before >= G_WINDOW - 1) and (s1_warm or to_bit(s1_slot = G_WINDOW - 1));
-  s1_inside <= to_bit(s1_run_x = G_WINDOW) and to_bit(s1_run_y = G_WINDOW);
+  s1_wide   <= to_sl(s1_before = G_WINDOW);
+  s1_cell   <= s1_valid and to_sl(s1_before >= G_WINDOW - 1) and (s1_warm or to_sl(s1_slot = G_WINDOW - 1));
+  s1_inside <= to_sl(s1_run_x = G_WINDOW) and to_sl(s1_run_y = G_WINDOW);
 
   -- Bits that wait for the stage which needs them.
 
@@ -785,7 +785,7 @@ begin
       s13_valid       <= s12_valid;
       v_num           := fill_low(unsigned(s12_half(C_DEN_W - 2 downto 0)) & '0', 64);
       v_den           := fill_low(unsigned(not s12_nden), 64);
-      s13_textured(0) <= s12_inside and to_bit(v_den /= 0);
+      s13_textured(0) <= s12_inside and to_sl(v_den /= 0);
       v_low_num       := v_num(31 downto 0) & to_unsigned(0, 32);
       v_low_den       := v_den(31 downto 0) & to_unsigned(0, 32);
       if v_den(63 downto 48) /= 0 then

@@ -91,9 +91,10 @@ architecture rtl of storage is
   constant C_DEPTH  : integer := bank_depth(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
   constant C_BANK_W : integer := bank_bits(G_IMG_COLS, G_IMG_ROWS, G_RECTIFIED);
   constant C_COL_W  : integer := clog2(G_IMG_COLS);
-  constant C_COPIES : integer := G_LANES / 2;
+  constant C_COPIES : integer := G_LANES / 2; -- of the banks, where two lanes share a bank
+  constant C_BANKS  : integer := 4 - 2 * G_RECTIFIED;
 
-  constant C_RECTIFIED : std_logic := to_bit(G_RECTIFIED = 1);
+  constant C_RECTIFIED : std_logic := to_sl(G_RECTIFIED = 1);
 
   -- Load.
   signal write_row  : unsigned(C_BANK_W - 1 downto 0); -- address of column 0 of the row (pair) being loaded
@@ -113,15 +114,12 @@ architecture rtl of storage is
   signal s0_row_even : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
   signal s0_row_odd  : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
   signal s0_unusable : std_logic_vector(G_LANES - 1 downto 0);
-  -- s1: addresses of the four banks, for each image and lane; s2, s3: inside the RAMs; s3: their words; s4: the quads.
-  signal s1_addr_0 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
-  signal s1_addr_1 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
-  signal s1_addr_2 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
-  signal s1_addr_3 : std_logic_vector(2 * G_LANES * C_BANK_W - 1 downto 0);
-  signal s3_word_0 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
-  signal s3_word_1 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
-  signal s3_word_2 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
-  signal s3_word_3 : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
+  -- s1: address for each reader (image and lane) and bank, bank b of reader n at 4 * n + b; s2, s3: inside the RAMs;
+  -- s3: their words; s4: the quads.
+  type t_addresses is array (0 to 8 * G_LANES - 1) of std_logic_vector(C_BANK_W - 1 downto 0);
+  type t_words is array (0 to 8 * G_LANES - 1) of std_logic_vector(G_PIX_W - 1 downto 0);
+  signal s1_addr : t_addresses;
+  signal s3_word : t_words;
   signal s4_p00    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
   signal s4_p10    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
   signal s4_p01    : std_logic_vector(2 * G_LANES * G_PIX_W - 1 downto 0);
@@ -259,7 +257,7 @@ begin
     row_even <= s0_row_even((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     row_odd  <= s0_row_odd((n + 1) * C_BANK_W - 1 downto n * C_BANK_W);
     xi       <= s0_xi(n * C_INT_W + C_COL_W - 1 downto n * C_INT_W);
-    writes   <= write_any and to_bit(G_LANES > 1 and n mod 2 = 0);
+    writes   <= write_any and to_sl(G_LANES > 1 and n mod 2 = 0);
     column   <= write_addr when writes = '1'
                 else std_logic_vector(resize(unsigned(xi(C_COL_W - 1 downto 1)), C_BANK_W));
     round_up <= xi(0) and not writes;
@@ -286,14 +284,16 @@ begin
       end if;
     end process p_read;
 
-    s1_addr_0((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_0;
-    s1_addr_1((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_1;
-    s1_addr_2((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_2;
-    s1_addr_3((n + 1) * C_BANK_W - 1 downto n * C_BANK_W) <= addr_3;
-    word_0 <= s3_word_0((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
-    word_1 <= s3_word_1((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
-    word_2 <= s3_word_2((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
-    word_3 <= s3_word_3((n + 1) * G_PIX_W - 1 downto n * G_PIX_W);
+    s1_addr(4 * n)     <= addr_0;
+    s1_addr(4 * n + 1) <= addr_1;
+    s1_addr(4 * n + 2) <= addr_2;
+    s1_addr(4 * n + 3) <= addr_3;
+
+    word_0 <= s3_word(4 * n);
+    word_1 <= s3_word(4 * n + 1);
+    word_2 <= s3_word(4 * n + 2);
+    word_3 <= s3_word(4 * n + 3);
+
     s4_p00((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p00;
     s4_p10((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p10;
     s4_p01((n + 1) * G_PIX_W - 1 downto n * G_PIX_W) <= p01;
@@ -309,126 +309,53 @@ begin
     write_pixel <= write_data((image + 1) * G_PIX_W - 1 downto image * G_PIX_W);
     pair_pixel  <= pair_data((image + 1) * G_PIX_W - 1 downto image * G_PIX_W);
 
-    g_one : if G_LANES = 1 generate
+    g_bank : for b in 0 to C_BANKS - 1 generate
 
-      u_bank_0 : entity work.ram_deep
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-        port map (
-          clk   => clk,
-          we    => write_bank(0),
-          waddr => write_addr,
-          wdata => write_pixel,
-          raddr => s1_addr_0((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s3_word_0((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
-        );
+      g_one : if G_LANES = 1 generate
 
-      u_bank_1 : entity work.ram_deep
-        generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-        port map (
-          clk   => clk,
-          we    => write_bank(1),
-          waddr => write_addr,
-          wdata => write_pixel,
-          raddr => s1_addr_1((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-          rdata => s3_word_1((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
-        );
-
-      g_lower : if G_RECTIFIED = 0 generate
-
-        u_bank_2 : entity work.ram_deep
+        u_bank : entity work.ram_deep
           generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
           port map (
             clk   => clk,
-            we    => write_bank(2),
+            we    => write_bank(b),
             waddr => write_addr,
             wdata => write_pixel,
-            raddr => s1_addr_2((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-            rdata => s3_word_2((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
+            raddr => s1_addr(4 * image + b),
+            rdata => s3_word(4 * image + b)
           );
 
-        u_bank_3 : entity work.ram_deep
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH, G_LATENCY => 2)
-          port map (
-            clk   => clk,
-            we    => write_bank(3),
-            waddr => write_addr,
-            wdata => write_pixel,
-            raddr => s1_addr_3((image + 1) * C_BANK_W - 1 downto image * C_BANK_W),
-            rdata => s3_word_3((image + 1) * G_PIX_W - 1 downto image * G_PIX_W)
-          );
+      end generate g_one;
 
-      end generate g_lower;
-
-    end generate g_one;
-
-    g_pair : if G_LANES > 1 generate
-
-      g_copy : for copy in 0 to C_COPIES - 1 generate
-        constant C_A : integer := image * G_LANES + 2 * copy;
-        constant C_B : integer := C_A + 1;
+      g_pair : for copy in 0 to C_COPIES - 1 generate
+        constant C_A : integer := 4 * (image * G_LANES + 2 * copy) + b;
+        constant C_B : integer := C_A + 4;
       begin
 
-        u_bank_0 : entity work.ram_2r
+        u_bank : entity work.ram_2r
           generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
           port map (
             clk     => clk,
-            a_we    => pair_bank(0),
-            a_addr  => s1_addr_0((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
+            a_we    => pair_bank(b),
+            a_addr  => s1_addr(C_A),
             a_wdata => pair_pixel,
-            a_rdata => s3_word_0((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
-            b_addr  => s1_addr_0((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
-            b_rdata => s3_word_0((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
+            a_rdata => s3_word(C_A),
+            b_addr  => s1_addr(C_B),
+            b_rdata => s3_word(C_B)
           );
 
-        u_bank_1 : entity work.ram_2r
-          generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
-          port map (
-            clk     => clk,
-            a_we    => pair_bank(1),
-            a_addr  => s1_addr_1((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-            a_wdata => pair_pixel,
-            a_rdata => s3_word_1((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
-            b_addr  => s1_addr_1((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
-            b_rdata => s3_word_1((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
-          );
+      end generate g_pair;
 
-        g_lower : if G_RECTIFIED = 0 generate
-
-          u_bank_2 : entity work.ram_2r
-            generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
-            port map (
-              clk     => clk,
-              a_we    => pair_bank(2),
-              a_addr  => s1_addr_2((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-              a_wdata => pair_pixel,
-              a_rdata => s3_word_2((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
-              b_addr  => s1_addr_2((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
-              b_rdata => s3_word_2((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
-            );
-
-          u_bank_3 : entity work.ram_2r
-            generic map (G_DATA_W => G_PIX_W, G_DEPTH => C_DEPTH)
-            port map (
-              clk     => clk,
-              a_we    => pair_bank(3),
-              a_addr  => s1_addr_3((C_A + 1) * C_BANK_W - 1 downto C_A * C_BANK_W),
-              a_wdata => pair_pixel,
-              a_rdata => s3_word_3((C_A + 1) * G_PIX_W - 1 downto C_A * G_PIX_W),
-              b_addr  => s1_addr_3((C_B + 1) * C_BANK_W - 1 downto C_B * C_BANK_W),
-              b_rdata => s3_word_3((C_B + 1) * G_PIX_W - 1 downto C_B * G_PIX_W)
-            );
-
-        end generate g_lower;
-
-      end generate g_copy;
-
-    end generate g_pair;
+    end generate g_bank;
 
   end generate g_image;
 
   g_no_lower : if G_RECTIFIED = 1 generate
-    s3_word_2 <= (others => '0');
-    s3_word_3 <= (others => '0');
+
+    g_zero : for n in 0 to 2 * G_LANES - 1 generate
+      s3_word(4 * n + 2) <= (others => '0');
+      s3_word(4 * n + 3) <= (others => '0');
+    end generate g_zero;
+
   end generate g_no_lower;
 
   m_p00_left  <= s4_p00(G_LANES * G_PIX_W - 1 downto 0);
@@ -498,7 +425,7 @@ begin
     p_rules : process (clk)
     begin
       if rising_edge(clk) then
-        assert (load_valid or (write_any and to_bit(G_LANES > 1))) /= '1' or s_valid(n) /= '1'
+        assert (load_valid or (write_any and to_sl(G_LANES > 1))) /= '1' or s_valid(n) /= '1'
           report "storage: a pixel is written while samples are read"
           severity failure;
         assert write_any /= '1' or G_LANES = 1 or n mod 2 = 1

@@ -61,7 +61,7 @@ begin
     severity failure;
 
   taken      <= write_place - read_place;
-  s_ready    <= to_bit(write_place + 1 /= read_place);
+  s_ready    <= to_sl(write_place + 1 /= read_place);
   s_fire     <= s_tvalid and s_ready;
   next_place <= read_place + 1 when m_valid = '1' and m_tready = '1' else read_place;
   s_tready   <= s_ready;
@@ -90,9 +90,9 @@ begin
         write_place <= write_place + 1;
       end if;
       read_place <= next_place;
-      m_valid    <= to_bit(next_place /= write_place); -- written before this clock
+      m_valid    <= to_sl(next_place /= write_place); -- written before this clock
       few        <= not taken(G_DEPTH_LOG2 - 1);
-      more       <= s_fire or (to_bit(next_place /= write_place) and to_bit(next_place + 1 /= write_place));
+      more       <= s_fire or (to_sl(next_place /= write_place) and to_sl(next_place + 1 /= write_place));
       if rst = '1' then
         write_place <= (others => '0');
         read_place  <= (others => '0');

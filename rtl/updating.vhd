@@ -302,10 +302,10 @@ begin
       way_prev(G_MNCC_W - 1 downto 0)      <= word_prev;
       way_plane(C_PLANE_W - 1 downto 0)    <= word_plane;
       way_frac(G_FRAC_W - 1 downto 0)      <= word_frac;
-      way_won(0)                           <= to_bit(unsigned(word_best) /= 0);
+      way_won(0)                           <= to_sl(unsigned(word_best) /= 0);
       way_local_max(0)                     <= word_local_max;
       way_prev_ok(0)                       <= word_prev_valid;
-      way_before(0)                        <= to_bit(unsigned(word_plane) = resize(s2_before, C_PLANE_W));
+      way_before(0)                        <= to_sl(unsigned(word_plane) = resize(s2_before, C_PLANE_W));
       if s2_first = '1' then
         way_best(G_MNCC_W - 1 downto 0)    <= (others => '0');
         way_prev(G_MNCC_W - 1 downto 0)    <= (others => '0');
@@ -376,7 +376,7 @@ begin
     v        <= unsigned(side(n * C_SIDE_W + G_MNCC_W - 1 downto n * C_SIDE_W));
     textured <= side(n * C_SIDE_W + G_MNCC_W);
     inside   <= side(n * C_SIDE_W + G_MNCC_W + 1);
-    on_q     <= to_bit(n = 0) or side(n * C_SIDE_W + G_MNCC_W + 2);
+    on_q     <= to_sl(n = 0) or side(n * C_SIDE_W + G_MNCC_W + 2);
 
     set_now   <= way_set((n + 1) * C_SET_W - 1 downto n * C_SET_W);
     plane_now <= shift_left(resize(unsigned(set_now), C_SET_W + C_LANE_W), C_LANE_W) + n;
@@ -385,7 +385,7 @@ begin
     old_plane <= way_plane((n + 1) * C_PLANE_W - 1 downto n * C_PLANE_W);
     old_frac  <= way_frac((n + 1) * G_FRAC_W - 1 downto n * G_FRAC_W);
 
-    better   <= inside and to_bit(v > old_best) and on_q;
+    better   <= inside and to_sl(v > old_best) and on_q;
     won      <= way_won(n);
     adjacent <= won and way_before(n) and on_q;
     -- Without a parabola these mean nothing: the first lane need not choose.
@@ -539,7 +539,7 @@ begin
   dbg_map_best       <= write_word(C_WORD_W - 1 downto G_MNCC_W + C_PLANE_W + G_FRAC_W + 2);
 
   -- Unload -----------------------------------------------------------------------------------------------------------
-  at_last_cell <= to_bit(read_cell = last_cell);
+  at_last_cell <= to_sl(read_cell = last_cell);
 
   fetch        <= unloading and few;
 
@@ -578,10 +578,10 @@ begin
     end if;
   end process p_beat;
 
-  empty   <= to_bit(sent_best = 0);
+  empty   <= to_sl(sent_best = 0);
   mask(0) <= empty and not sent_frac(0);
   mask(1) <= empty and sent_frac(0) and not sent_frac(1);
-  mask(2) <= to_bit(sent_best < unsigned(threshold)) and not (empty and not (sent_frac(0) and sent_frac(1)));
+  mask(2) <= to_sl(sent_best < unsigned(threshold)) and not (empty and not (sent_frac(0) and sent_frac(1)));
   mask(3) <= not sent_local_max and not (empty and not (sent_frac(0) and sent_frac(1)));
 
   out_data <= sent_last & mask & sent_plane & sent_frac & std_logic_vector(sent_best);

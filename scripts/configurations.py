@@ -293,7 +293,7 @@ def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> Lis
     asserted = {unit: vhdl_limits(sources.design(unit)) for unit in sources.units}
     info = {int(word): value for word, value in
             re.findall(r"v_words\((\d+)\)\s*:=\s*std_logic_vector\(to_unsigned\((G_\w+), 32\)\)",
-                       sources.text("responder"))}
+                       sources.text("info_rom"))}
     seen = set()
     for kind, (folder, _, entity) in KINDS.items():
         generics = {generic.name: int(generic.default) for generic in sources.entity(entity).generics}
@@ -307,7 +307,7 @@ def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> Lis
             if not field.holds(field.default):
                 found.append(f"{where}: default {field.default} is not {field.range()}")
             if field.info and info.get(field.info) != field.generic:
-                found.append(f"{where}: word {field.info} of INFO is {info.get(field.info)} in responder")
+                found.append(f"{where}: word {field.info} of INFO is {info.get(field.info)} in info_rom")
             limits = [limit for name in field.asserted or (f"{n}.{field.generic}" for n in sources.units)
                       for limit in asserted[name.split(".")[0]].get(name.split(".")[1], [])]
             if not limits:

@@ -16,6 +16,7 @@
 #include "contract/registers.hpp"
 #include "golden/control.hpp"
 #include "golden/counters.hpp"
+#include "golden/info_rom.hpp"
 #include "golden/map_buffer.hpp"
 #include "golden/row_buffer.hpp"
 #include "golden/scheduler.hpp"
@@ -354,17 +355,7 @@ class Responder {
   }
 
   void append_info(Bytes& out) const {
-    uint32_t w[net::kInfoWords] = {};
-    auto u = [](auto v) { return static_cast<uint32_t>(v); };
-    for (const auto& field : kEngineFields) w[field.info] = u(config_.engine.*field.value);
-    for (const auto& field : kChipFields) w[field.info] = u(config_.*field.value);
-    w[0] = uint32_t{net::kVersion} << 16 | net::kInfoWords;  // that was the place of fields without a word
-    w[13] = u(config_.cell_bits());
-    w[14] = u(mac_ >> 32), w[15] = u(mac_);
-    w[18] = u(config_.pair_bytes()), w[19] = u(config_.chunk_pairs()), w[20] = u(config_.slots());
-    w[21] = u(config_.cell_bytes()), w[22] = u(config_.chunk_cells()), w[23] = u(config_.depth());
-    w[26] = net::kCounterWords;
-    for (const uint32_t v : w) net::append32(out, v);
+    for (const uint32_t v : info_words(config_, config_.depth(), mac_)) net::append32(out, v);
   }
 
   net::ArbiterConfig config_;

@@ -79,7 +79,8 @@ _CHIP_LAST = (
 _NOT_OF_THE_CHIP = {"test_link", "test_goodput", "test_link_plan_chip", "test_host", "test_fuzz", "test_psweep_top"}
 # Packages, and what has its test elsewhere.
 _OWN = {"psweep_pkg": ("address_generator", "ram_deep", "ram_2r", "storage", "updating"),
-        "eth_pkg": ("mac_rx", "mac_tx", "packet_rx")}
+        "eth_pkg": ("mac_rx", "mac_tx", "packet_rx"),
+        "link_pkg": ("packet_rx", "packet_tx", "row_buffer", "map_buffer")}
 
 
 class Chains:
