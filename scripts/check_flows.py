@@ -784,15 +784,15 @@ def change(file, old, new):
 
 # check that has to tell, file, what, by what, what it has to say
 FAULTS = (
-    ("sources", "rtl/psweep_top.core", "      - mac_tx.vhd\n", "", "FuseSoC: files differ"),
-    ("sources", "rtl/psweep.core", "      - ram_sdp.vhd\n      - ram_2r.vhd\n",
-     "      - ram_2r.vhd\n      - ram_sdp.vhd\n", "FuseSoC: files differ from rtl/files.f: order"),
+    ("sources", "rtl/psweep_top.core", "      - ethernet/mac_tx.vhd\n", "", "FuseSoC: files differ"),
+    ("sources", "rtl/psweep.core", "      - common/ram_sdp.vhd\n      - common/ram_2r.vhd\n",
+     "      - common/ram_2r.vhd\n      - common/ram_sdp.vhd\n", "FuseSoC: files differ from rtl/files.f: order"),
     ("sources", "scripts/flows/project.py", "    return files\n",
      '    return [f for f in files if f.name != "divider.vhd"]\n', "differ from rtl/files.f"),
     ("sources", "scripts/cmake/RtlModel.cmake", "list(APPEND sources ${CMAKE_SOURCE_DIR}/rtl/${line})",
      "list(INSERT sources 0 ${CMAKE_SOURCE_DIR}/rtl/${line})", "CMake: files of"),
-    ("analyse", "rtl/files.f", "divider_mul.vhd\nsimilarity.vhd\n",
-     "similarity.vhd\ndivider_mul.vhd\n", "divider_mul"),
+    ("analyse", "rtl/files.f", "common/divider_mul.vhd\nengine/similarity.vhd\n",
+     "engine/similarity.vhd\ncommon/divider_mul.vhd\n", "divider_mul"),
     ("analyse", "rtl/configs/engine/tile.json", '"window": 13', '"window": 12', "GHDL ends with 1"),
     ("generics", "rtl/psweep_top.core", "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 2}",
      "G_RX_SLOTS: {datatype: int, paramtype: generic, default: 4}", "parameters differ from the VHDL"),

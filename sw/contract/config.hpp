@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numeric contract's parameters (rtl/psweep_pkg.vhd has the same constants, rtl/psweep.vhd the same generics) and
+// The numeric contract's parameters (psweep_pkg.vhd has the same constants, psweep.vhd the same generics) and
 // the run-time description of one tile. Prose: docs/numeric_contract.md.
 #pragma once
 #include <algorithm>

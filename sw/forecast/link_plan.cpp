@@ -25,7 +25,7 @@ constexpr int kLeastFrame = 60;                          // without FCS
 constexpr double kLeastPause = 1e-3, kMostPause = 0.25;  // of the host, link_engine.cpp
 constexpr uint32_t kAnswerEvery = 8;                     // likewise
 
-// Clocks of the chip's parts (headers of rtl/responder.vhd, packet_tx.vhd and scheduler.vhd).
+// Clocks of the chip's parts (headers of responder.vhd, packet_tx.vhd and scheduler.vhd).
 constexpr int kHeaderClocks = 62;    // a message until it is obeyed: whose it is, too
 constexpr int kDivideClocks = 26;    // START: its chunks against its pixels
 constexpr int kPeerClocks = 62;      // who asked, before a reply
@@ -669,7 +669,7 @@ double ram36(int width, int depth) {
   return in_luts < best->price ? 0 : best->blocks;
 }
 
-// rtl/ram_deep.vhd: parts of a power of two words, the deep ones with a memory of their own for `nines` bits.
+// ram_deep.vhd: parts of a power of two words, the deep ones with a memory of their own for `nines` bits.
 double ram_deep36(int width, int depth, int nines) {
   constexpr int kMost = 4, kGrain = 2048, kLeast = 512, kSplit = 8192;
   double blocks = 0;
@@ -689,7 +689,7 @@ double ram_deep36(int width, int depth, int nines) {
   return blocks;
 }
 
-// As rtl/arbiter.vhd derives the generics of both buffers, and these their memories.
+// As arbiter.vhd derives the generics of both buffers, and these their memories.
 BufferRam buffer_ram(const net::ArbiterConfig& c) {
   BufferRam r;
   const int slots = std::max(2, c.slots()), most = c.engine.plane_cols * c.engine.plane_rows;

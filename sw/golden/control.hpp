@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Model of entity control: its errors and counters, what it takes for a job and a plane table, and the engine's timing,
-// i.e. the latencies of its stages and the clocks of a tile. Constants mirror rtl/psweep_pkg.vhd and rtl/control.vhd;
+// i.e. the latencies of its stages and the clocks of a tile. Constants mirror psweep_pkg.vhd and control.vhd;
 // the bench compares measured clocks with them. Registers, states and error bits: contract/registers.hpp.
 #pragma once
 #include <algorithm>
