@@ -712,7 +712,7 @@ begin
       s9_cell      <= s8_flags(1);
       s9_row_first <= s8_flags(0);
       s9_l         <= s8_l;
-      s9_l_2       <= s8_l + 2;
+      s9_l_2       <= (s8_l(C_SL_W - 1 downto 1) + 1) & s8_l(0); -- + 2; as one sum Yosys 0.70 packs it wrongly
       s9_r         <= s8_r;
       if C_SPLIT then
         s9_n_dx    <= resize(s8_dx(C_CX_W downto C_LOW_W) * to_signed(C_N, C_NGROW + 1), s9_n_dx'length);
@@ -725,7 +725,7 @@ begin
       end if;
       -- s10
       s10_valid <= s9_valid and s9_cell;
-      s10_l     <= s9_l + 1;
+      s10_l     <= (s9_l(C_SL_W - 1 downto 1) + signed('0' & s9_l(0 downto 0))) & not s9_l(0); -- + 1, likewise
       s10_r     <= s9_r;
       s10_ll    <= s9_l_2 * s9_l;
       if s9_valid = '1' then
