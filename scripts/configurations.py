@@ -95,6 +95,7 @@ class Configuration(NamedTuple):
         return {**self.engine.generics(), **own} if self.engine else own
 
 
+@functools.lru_cache(maxsize=None)
 def schema(kind: str) -> Dict[str, Any]:
     """The schema as it stands in the file."""
     content: Dict[str, Any] = json.loads((CONFIGS / f"{kind}.schema.json").read_text())
@@ -176,7 +177,7 @@ def find(name: str, kind: str = "engine", build: pathlib.Path = ROOT / "build") 
 
 # For CMake and C++ ----------------------------------------------------------------------------------------------------
 def cmake_text(build: pathlib.Path, own: bool) -> str:
-    """PSWEEP_<KIND>_NAMES: all; for each PSWEEP_<KIND>_<name>_{FILE,DESCRIPTION,WAVES,GENERICS,VALUES}. VALUES: C++
+    """PSWEEP_<KIND>_NAMES: all; for each PSWEEP_<KIND>_<name>_{DESCRIPTION,WAVES,GENERICS,VALUES}. VALUES: C++
     that assigns to members of c; of a chip also _ENGINE and _ENGINE_VALUES."""
     lines = ["# Written by scripts/configurations.py."]
     for kind in KINDS:
@@ -185,7 +186,7 @@ def cmake_text(build: pathlib.Path, own: bool) -> str:
         lines.append(f"set(PSWEEP_{upper}_NAMES {' '.join(known)})")
         for name, path in known.items():
             config = read(path, kind, build)
-            about = {"FILE": str(path), "DESCRIPTION": config.description, "WAVES": "ON" if config.waves else "OFF",
+            about = {"DESCRIPTION": config.description, "WAVES": "ON" if config.waves else "OFF",
                      "GENERICS": ";".join(f"{generic}={value}" for generic, value in config.generics().items()),
                      "VALUES": _assignments(config.values)}
             if config.engine:
@@ -297,6 +298,7 @@ def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> Lis
     seen = set()
     for kind, (folder, _, entity) in KINDS.items():
         generics = {generic.name: int(generic.default) for generic in sources.entity(entity).generics}
+        page = (pages / f"{entity}.md").read_text() if (pages / f"{entity}.md").exists() else ""
         for field in fields(kind):
             where = f"rtl/configs/{kind}.schema.json: {field.key}"
             seen.add(field.generic)
@@ -314,7 +316,6 @@ def problems(build: pathlib.Path, rtl: pathlib.Path, pages: pathlib.Path) -> Lis
                 found.append(f"{where}: no assertion in rtl/ checks {field.generic}")
             elif not _agrees(field, limits):
                 found.append(f"{where}: {field.range()}, but rtl/ asserts {sorted(set(limits))}")
-            page = (pages / f"{entity}.md").read_text() if (pages / f"{entity}.md").exists() else ""
             if page and f"| {field.generic} |" not in page:
                 found.append(f"docs/{entity}.md: no row for {field.generic}")
         if kind == "chip":

@@ -12,7 +12,7 @@ from . import arrows
 from .tree import Skip, Tree
 
 TOP_LEVEL = re.compile(r"rtl|tb|sw|constraints|scripts|docs|CMakeLists\.txt|CMakePresets\.json|Makefile|"
-                       r"\w+\.md|LICENSE|Containerfile|mkdocs\.yml|pyproject\.toml|\..*")
+                       r"README\.md|LICENSE|\..*")
 FOLDERS = (".", "rtl", "tb", "sw", "constraints", "scripts", "docs")
 MOST_LINES = 40  # of a shell script, which only calls
 
@@ -117,11 +117,11 @@ def _python_tool(name: str) -> str:
 
 
 def check_python(tree: Tree) -> list[str]:
-    """ruff on the Python (pyproject.toml)."""
+    """ruff on the Python (.ruff.toml)."""
     return _run(tree, _python_tool("ruff"), "check", "--quiet", "--no-cache", "--output-format=concise",
                 *tree.select(r"\.py$"))
 
 
 def check_types(tree: Tree) -> list[str]:
-    """mypy --strict on the package of the tools (pyproject.toml)."""
+    """mypy --strict on the package of the tools (.mypy.ini)."""
     return _run(tree, _python_tool("mypy"), "--no-error-summary", "--cache-dir=/dev/null")
