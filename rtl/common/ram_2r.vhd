@@ -98,7 +98,9 @@ begin
       if rising_edge(clk) then
         if we = '1' then
           memory(to_integer(unsigned(a_low))) <= a_wdata;
-        else
+        end if;
+        -- Not an else branch of the write: GHDL 2.0 makes a read register of it whose enable is we itself.
+        if we = '0' then
           a_word <= memory(to_integer(unsigned(a_low)));
         end if;
         b_word <= memory(to_integer(unsigned(b_low)));

@@ -725,7 +725,7 @@ begin
       end if;
       -- s10
       s10_valid <= s9_valid and s9_cell;
-      s10_l     <= (s9_l(C_SL_W - 1 downto 1) + signed('0' & s9_l(0 downto 0))) & not s9_l(0); -- + 1, likewise
+      s10_l     <= (s9_l(C_SL_W - 1 downto 1) + signed('0' & s9_l(0 downto 0))) & not s9_l(0); -- + 1, same reason
       s10_r     <= s9_r;
       s10_ll    <= s9_l_2 * s9_l;
       if s9_valid = '1' then

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # VHDL entity + generics -> Verilated C++ library.
 #
-#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [UPSETS <option> ..])
+#   rtl_model(<name> TOP <entity> [GENERICS K=V ...] [TRACE] [FAST] [BOTH_EDGES] [AS_SYNTHESIZED] [UPSETS <option> ..])
 #     Static library <name> with header V<name>.h (class V<name>) for an entity of rtl/files.f. TRACE: the model can
 #     write FST waves (costs nothing until a file is opened, but longer compilation). FAST: compiled for long runs.
 #     BOTH_EDGES: every change of clk is a clock, so that a clock is one evaluation (for entities with one clock).
+#     AS_SYNTHESIZED: a word that a RAM reads while it is written is what the template says, not random.
 #     UPSETS: registers can be upset: options of `scripts/tools.py upsets`, which writes <name>.inc as well.
 #   rtl_must_not_elaborate(<test> TOP <entity> GENERICS K=V ... MESSAGE <regex>)
 #     ctest case: elaboration with these generics has to fail, and the message has to match. Without MESSAGE it has to
@@ -110,7 +111,7 @@ function(psweep_rtl_file entity out)
 endfunction()
 
 function(rtl_model name)
-  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES" "TOP" "GENERICS;UPSETS" ${ARGN})
+  cmake_parse_arguments(A "TRACE;FAST;BOTH_EDGES;AS_SYNTHESIZED" "TOP" "GENERICS;UPSETS" ${ARGN})
   psweep_rtl_sources(${A_TOP} sources)
   set(dir ${CMAKE_CURRENT_BINARY_DIR}/${name})
   set(obj ${dir}/obj)
@@ -140,7 +141,7 @@ function(rtl_model name)
     COMMAND
       ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
       SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES}
-      -D UPSETS=${upsets} -D SITES=${dir}/${name}.inc -D PYTHON=${PSWEEP_PYTHON} -P
+      -D AS_SYNTHESIZED=${A_AS_SYNTHESIZED} -D UPSETS=${upsets} -D SITES=${dir}/${name}.inc -D PYTHON=${PSWEEP_PYTHON} -P
       ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake ${PSWEEP_RTL_MODEL_DIR}/EditedSources.cmake
             ${upset_tool}

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # cmake -D GHDL= -D STANDARD= -D TOP= -D SOURCES=a|b -D GENERICS=-gK=V|.. -D DIR=<work folder> [-D BOTH_EDGES=ON]
-#       [-D UPSETS=option|.. -D SITES=<file> -D PYTHON=] -P VhdlToVerilog.cmake
+#       [-D AS_SYNTHESIZED=ON] [-D UPSETS=option|.. -D SITES=<file> -D PYTHON=] -P VhdlToVerilog.cmake
 # UPSETS: registers that can be upset, by scripts/tools.py upsets, which lists them in SITES.
 # Writes DIR/TOP.v. The file keeps its time stamp if the text did not change, so nothing is Verilated for a comment.
 # What stands between translate_off and translate_on behind a comment '-- collision:' is translated all the same: a
 # word that a RAM reads while it is written is random in the models, as it is 'X' in the VHDL, not the old one of the
-# template that synthesis tools see. Such files are copied into DIR.
+# template that synthesis tools see. Such files are copied into DIR. With AS_SYNTHESIZED it is left out, as synthesis
+# tools leave it out: GHDL may translate the bare template in another way.
 # Shows GHDL's messages if it fails or warns; its notes ("found RAM ..") are left out, as is the warning that attributes
 # for the FPGA tools do not reach the Verilog.
 include(${CMAKE_CURRENT_LIST_DIR}/EditedSources.cmake)
@@ -27,8 +28,11 @@ function(run_ghdl)
     message("${text}")
   endif()
 endfunction()
-edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
-               "-- collision:" ${SOURCES})
+set(models ${SOURCES})
+if(NOT AS_SYNTHESIZED)
+  edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
+                 "-- collision:" ${SOURCES})
+endif()
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${models})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})
 if(UPSETS)

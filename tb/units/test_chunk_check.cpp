@@ -22,7 +22,7 @@ template <class Dut>
 struct Bench {
   explicit Bench(uint32_t chunk_pairs) : pairs(chunk_pairs) { dut.clk = 0; }
   ~Bench() {
-    save_coverage(context);
+    simulator::save_coverage(context);
     dut.final();
   }
   void clock() {

@@ -35,7 +35,7 @@ void run(const net::ArbiterConfig& config, int depth) {
   }
   INFO(board.report());
   CHECK(board.ok());
-  save_coverage(context);
+  simulator::save_coverage(context);
   dut.final();
 }
 

@@ -22,7 +22,7 @@ template <class Dut>
 struct Bench {
   Bench(uint32_t seed, int row_slots) : model(row_slots), random(seed) { dut.clk = 0; }
   ~Bench() {
-    save_coverage(context);
+    simulator::save_coverage(context);
     dut.final();
   }
   bool chance(unsigned n) { return random() % n == 0; }
