@@ -6,7 +6,7 @@
 --               session_timer know the session, map_sender the READ in force. The reply's header is the request's, read
 --               again. A message is obeyed only after packet_rx has found the whole frame good, so nothing has to be
 --               undone
---   Rate      : rows and cells one byte a clock; replies one byte in 6 clocks (at 60 MHz a status in 6 us)
+--   Rate      : rows and cells one byte a clock; replies one byte in 5 clocks, of the bitmap in 11
 --   Session   : one token and one peer; silence of G_SESSION_MS aborts all and ends it
 --   Limits    : OPEN, ARP and all else that is not authentic are answered while there is one left in their bucket
 --   Upsets    : message_sequencer ends the session and goes on (1 ms after the session's time; without a session after
