@@ -16,13 +16,10 @@ if(INPUTS)
   set(conditional OFF)
   foreach(file IN LISTS files)
     file(READ ${OBJ}/${file} text)
-    set(edited "${text}")
-    foreach(first "(0U == vlSelf->__VicoIterCount)" "(IData)(vlSelfRef.__VicoFirstIteration)")
-      string(REPLACE "Triggered.at(0U) = ${first};" "Triggered.at(0U) = ${first} && psweep_inputs_changed;" edited
-                     "${edited}")
-      string(REPLACE "VicoTriggered.setBit(0U, ${first});"
-                     "VicoTriggered.setBit(0U, ${first} && psweep_inputs_changed);" edited "${edited}")
-    endforeach()
+    # Verilator 5.006, 5.020 and later, 5.032.
+    string(REGEX REPLACE "(VicoTriggered\\.(at\\(0U\\) = |set(Bit)?\\(0U, )\
+(\\(0U == vlSelf->__VicoIterCount\\)|\\(IData\\)\\(vlSelfRef\\.__VicoFirstIteration\\)))"
+                         "\\1 && psweep_inputs_changed" edited "${text}")
     if(NOT edited STREQUAL text)
       file(WRITE ${OBJ}/${file} "${edited}")
       set(conditional ON)
