@@ -21,7 +21,8 @@ _RANGE = r"(?:\[\s*(\d+)\s*:\s*0\s*\]\s*)?"
 
 
 def modules(text: str) -> dict[str, str]:
-    """{name: what stands between the name and 'endmodule'}, in order."""
+    """{name: what stands between the name and 'endmodule'}, in order; without attributes, which GHDL 5 writes."""
+    text = re.sub(r"\(\* .*? \*\) ", "", text)
     return {m[1]: m[2] for m in re.finditer(r"^module (\w+)\b(.*?)^endmodule\n", text, re.M | re.S)}
 
 

@@ -21,7 +21,7 @@ CIRCUIT = """module ram_sdp_8
   (input  clk,
    input  we,
    output [7:0] rdata);
-  reg [7:0] memory[3:0] ; // memory
+  (* ram_style="block" *) reg [7:0] memory[3:0] ; // memory
   reg [7:0] n5_data;
   assign rdata = n5_data; //
   always @(posedge clk)
