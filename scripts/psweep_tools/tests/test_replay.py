@@ -21,7 +21,7 @@ CIRCUIT = """module ram_sdp_8
   (input  clk,
    input  we,
    output [7:0] rdata);
-  (* ram_style="block" *) reg [7:0] memory[3:0] ; // memory
+  reg [7:0] memory[3:0] ; // memory
   reg [7:0] n5_data;
   assign rdata = n5_data; //
   always @(posedge clk)
@@ -105,6 +105,11 @@ class Upsets(unittest.TestCase):
         self.assertIn("memory[psweep.flip_word[1:0]] <= memory[psweep.flip_word[1:0]] ^ psweep.flip_mask[7:0];", text)
         self.assertIn("n3_q <= n9 ^ (psweep.flip_site == 5 ? {6'd0, psweep.flip_mask} : 70'd0);", text)
         self.assertEqual(text.count("module ram_sdp_8__"), 2)
+
+    def test_attributes_change_nothing(self) -> None:  # GHDL 5 writes them
+        attributed = CIRCUIT.replace("  reg [7:0] memory", '  (* ram_style="block" *) reg [7:0] memory')
+        self.assertNotEqual(attributed, CIRCUIT)
+        self.assertEqual(self.inject(attributed, rams=True), self.inject(CIRCUIT, rams=True))
 
     def test_wide_and_both_edges(self) -> None:
         text, sites = self.inject(CIRCUIT, wide=True, both_edges=True)
