@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // psweep depth: reads everything, checks everything, sweeps, writes everything (docs/file_formats.md lists the files).
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -151,10 +152,22 @@ ordered_json link_report(const net::LinkRun& link) {
           {"wait_map_clocks", counted(f.wait_map_clocks)}};
 }
 
-}  // namespace
+ordered_json rtl_report(const RtlFigures& rtl, double seconds) {
+  const auto clocks = static_cast<double>(rtl.clocks_in_all);
+  return {{"configuration", rtl.configuration},
+          {"image_buffer", {rtl.generics.img_cols, rtl.generics.img_rows}},
+          {"largest_tile", {rtl.generics.plane_cols, rtl.generics.plane_rows}},
+          {"lanes", rtl.generics.lanes},
+          {"rectified", rtl.generics.rectified},
+          {"clocks", rtl.clocks},
+          {"clocks_by_formula", rtl.clocks_expected},
+          {"clocks_in_all", rtl.clocks_in_all},
+          {"seconds_at_166_MHz", clocks / 166e6},
+          {"seconds_at_300_MHz", clocks / 300e6},
+          {"simulated_clocks_per_second", seconds > 0 ? clocks / seconds : 0}};
+}
 
-void depth_command(const DepthOptions& o) {
-  const auto start = std::chrono::steady_clock::now();
+void check_options(const DepthOptions& o) {
   if (o.calibration.empty() && o.disparity_range.empty()) {
     throw InputError("--calib: found nothing, expected a calibration file (or --disparity-range LO:HI)");
   }
@@ -167,81 +180,98 @@ void depth_command(const DepthOptions& o) {
   if (o.engine == "float" && o.frac_bits && !o.mncc_bits) {
     throw InputError("--frac-bits: with --engine float only together with --mncc-bits");
   }
-  Gray left = read_gray(o.left);
-  Gray right = read_gray(o.right);
-  if (left.width != right.width || left.height != right.height) {
-    throw InputError(o.right + ": the image is " + std::to_string(right.width) + "x" + std::to_string(right.height) +
-                     ", but " + o.left + " is " + std::to_string(left.width) + "x" + std::to_string(left.height));
+}
+
+struct Input {
+  Gray left, right;
+  Calibration calibration;
+};
+
+Input read_input(const DepthOptions& o) {
+  Input in;
+  in.left = read_gray(o.left);
+  in.right = read_gray(o.right);
+  if (in.left.width != in.right.width || in.left.height != in.right.height) {
+    throw InputError(o.right + ": the image is " + std::to_string(in.right.width) + "x" +
+                     std::to_string(in.right.height) + ", but " + o.left + " is " + std::to_string(in.left.width) +
+                     "x" + std::to_string(in.left.height));
   }
-  Calibration calibration = o.calibration.empty() ? Calibration() : read_calibration(o.calibration, o.rectify);
   if (o.calibration.empty()) {
     const DisparityRange range = parse_range(o.disparity_range);
-    calibration = disparity_range_calibration(range.lo, range.hi, left.width, left.height);
+    in.calibration = disparity_range_calibration(range.lo, range.hi, in.left.width, in.left.height);
+  } else {
+    in.calibration = read_calibration(o.calibration, o.rectify);
   }
-  adopt_size(calibration, o.left, left.width, left.height);
+  adopt_size(in.calibration, o.left, in.left.width, in.left.height);
+  return in;
+}
 
-  OutputDir out(o.output);
-  if (calibration.raw) {
-    RectifiedPair pair = rectify_pair(calibration, left, right);
-    left = std::move(pair.left);
-    right = std::move(pair.right);
-    calibration.rig = pair.rig;
-  }
+void rectify(Input& in) {
+  RectifiedPair pair = rectify_pair(in.calibration, in.left, in.right);
+  in.left = std::move(pair.left);
+  in.right = std::move(pair.right);
+  in.calibration.rig = pair.rig;
+}
 
+SweepSetup make_setup(const DepthOptions& o, const Input& in) {
   SweepSetup setup;
-  setup.rig = calibration.rig;
+  setup.rig = in.calibration.rig;
   setup.format = choose_format(o);
-  setup.spacing = choose_planes(o, calibration, setup.format.planes);
+  setup.spacing = choose_planes(o, in.calibration, setup.format.planes);
   setup.format.planes = setup.spacing.planes;
   setup.threshold = threshold_for(setup.format, o.threshold);
-  if (left.width < setup.format.window || left.height < setup.format.window) {
-    throw InputError(o.left + ": the image is " + std::to_string(left.width) + "x" + std::to_string(left.height) +
+  if (in.left.width < setup.format.window || in.left.height < setup.format.window) {
+    throw InputError(o.left + ": the image is " + std::to_string(in.left.width) + "x" + std::to_string(in.left.height) +
                      ", expected at least --window = " + std::to_string(setup.format.window) + " both ways");
   }
+  return setup;
+}
 
-  EngineRun run;
-  {
-    Progress bar(o.engine, o.quiet);
-    EngineRequest request{o.engine,  setup,       o.threshold,   {}, o.tile, o.configuration,
-                          o.threads, o.in_flight, o.link_timeout};
-    if (o.mncc_bits) request.rounding.mncc_bits = *o.mncc_bits;
-    if (o.frac_bits) request.rounding.frac_bits = *o.frac_bits;
-    run = run_engine(request, {left, right}, [&](uint64_t done, uint64_t total) { bar.update(done, total); });
-  }
-  DepthResult& result = run.result;
-  if (o.cleanup) {
-    CleanupOptions cleanup;
-    cleanup.uniqueness = !o.no_uniqueness;
-    cleanup.speckle = !o.no_speckle;
-    cleanup.uniqueness_m = 0.02 * setup.spacing.zmin;  // the rover's 2 cm at 1 m, in any unit of depth
-    clean_up(result, setup.rig, cleanup);
-  }
+EngineRun sweep(const DepthOptions& o, const SweepSetup& setup, const Input& in) {
+  Progress bar(o.engine, o.quiet);
+  EngineRequest request{o.engine,  setup,       o.threshold,   {}, o.tile, o.configuration,
+                        o.threads, o.in_flight, o.link_timeout};
+  if (o.mncc_bits) request.rounding.mncc_bits = *o.mncc_bits;
+  if (o.frac_bits) request.rounding.frac_bits = *o.frac_bits;
+  return run_engine(request, {in.left, in.right}, [&](uint64_t done, uint64_t total) { bar.update(done, total); });
+}
 
+void clean(const DepthOptions& o, const SweepSetup& setup, DepthResult& result) {
+  CleanupOptions cleanup;
+  cleanup.uniqueness = !o.no_uniqueness;
+  cleanup.speckle = !o.no_speckle;
+  cleanup.uniqueness_m = 0.02 * setup.spacing.zmin;  // the rover's 2 cm at 1 m, in any unit of depth
+  clean_up(result, setup.rig, cleanup);
+}
+
+void write_images(OutputDir& out, const SweepSetup& setup, const Input& in, const DepthResult& result) {
+  if (in.calibration.raw) {
+    write_png(out.file("rectified_left.png"), in.left);
+    write_png(out.file("rectified_right.png"), in.right);
+    write_calibration(out.file("rectified_calib.yaml"), in.calibration.rig);
+  }
   const double fb = setup.rig.cyclopean().fx * setup.rig.baseline;
-  const FloatImage disparity = left_disparity(setup.rig, result.depth);
-  if (calibration.raw) {
-    write_png(out.file("rectified_left.png"), left);
-    write_png(out.file("rectified_right.png"), right);
-    write_calibration(out.file("rectified_calib.yaml"), calibration.rig);
-  }
   write_pfm(out.file("depth.pfm"), result.depth);
   write_pfm(out.file("mncc.pfm"), result.mncc);
-  write_pfm(out.file("disparity.pfm"), disparity);
+  write_pfm(out.file("disparity.pfm"), left_disparity(setup.rig, result.depth));
   write_png(out.file("mask.png"), result.mask);
-  write_png(out.file("depth.png"), depth_picture(result.depth, setup.spacing, calibration.metric, fb));
-  write_ply(out.file("cloud.ply"), point_cloud(setup.rig, result.depth, result.mncc, left));
+  write_png(out.file("depth.png"), depth_picture(result.depth, setup.spacing, in.calibration.metric, fb));
+  write_ply(out.file("cloud.ply"), point_cloud(setup.rig, result.depth, result.mncc, in.left));
+}
 
+// report.json, but for the seconds in all.
+RunRecord make_record(const DepthOptions& o, const SweepSetup& setup, const Input& in, const EngineRun& run) {
   RunRecord record;
   record.rig = setup.rig;
   record.spacing = setup.spacing;
   record.window = setup.format.window;
-  record.metric = calibration.metric;
+  record.metric = in.calibration.metric;
   ordered_json& j = record.json;
   j["psweep"] = PSWEEP_VERSION;
   j["engine"] = o.engine;
   j["left"] = o.left;
   j["right"] = o.right;
-  j["calibration"] = {{"kind", to_string(calibration.kind)}, {"file", o.calibration}};
+  j["calibration"] = {{"kind", to_string(in.calibration.kind)}, {"file", o.calibration}};
   j["threshold"] = o.threshold;
   if (o.engine != "float") {
     const golden::Config& f = setup.format;
@@ -250,60 +280,68 @@ void depth_command(const DepthOptions& o) {
     j["tiles"] = {{"count", run.tiles}, {"largest_cols", run.largest_cols}, {"largest_rows", run.largest_rows}};
   }
   j["cleanup"] = {{"uniqueness", o.cleanup && !o.no_uniqueness}, {"speckle", o.cleanup && !o.no_speckle}};
-  j["cells"] = cell_counts(result);
+  j["cells"] = cell_counts(run.result);
   j["seconds"] = run.seconds;
-  j["seconds_in_all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (run.rtl) {
-    const auto clocks = static_cast<double>(run.rtl->clocks_in_all);
-    j["rtl"] = {{"configuration", run.rtl->configuration},
-                {"image_buffer", {run.rtl->generics.img_cols, run.rtl->generics.img_rows}},
-                {"largest_tile", {run.rtl->generics.plane_cols, run.rtl->generics.plane_rows}},
-                {"lanes", run.rtl->generics.lanes},
-                {"rectified", run.rtl->generics.rectified},
-                {"clocks", run.rtl->clocks},
-                {"clocks_by_formula", run.rtl->clocks_expected},
-                {"clocks_in_all", run.rtl->clocks_in_all},
-                {"seconds_at_166_MHz", clocks / 166e6},
-                {"seconds_at_300_MHz", clocks / 300e6},
-                {"simulated_clocks_per_second", run.seconds > 0 ? clocks / run.seconds : 0}};
-  }
+  j["seconds_in_all"] = nullptr;
+  if (run.rtl) j["rtl"] = rtl_report(*run.rtl, run.seconds);
   if (run.link) j["link"] = link_report(*run.link);
-  write_record(out.file("report.json"), record);
-  out.commit(output_names());
+  return record;
+}
 
-  if (o.quiet) return;
-  size_t found = 0;
-  for (const uint8_t m : result.mask.data) found += m == 0;
+void print_link(const net::LinkRun& link, int tiles) {
+  const net::LinkFigures& f = link.figures;
+  const net::LinkStatistics& s = link.statistics;
+  const double mhz = 1e-3 * link.chip.config.clk_khz;
+  std::printf(
+      "link %s: %d tiles, %.2f s; %.2f Mbit/s up, %.2f Mbit/s down; lost %llu, resent %llu; %.3f M engine "
+      "clocks = %.3f s at %.0f MHz\n",
+      link.peer.c_str(), tiles, f.seconds, 8e-6 * static_cast<double>(f.pixel_bytes) / f.seconds,
+      8e-6 * static_cast<double>(f.cell_bytes) / f.seconds, static_cast<unsigned long long>(s.lost),
+      static_cast<unsigned long long>(s.resent), 1e-6 * static_cast<double>(f.engine_clocks),
+      1e-6 * static_cast<double>(f.engine_clocks) / mhz, mhz);
+  if (f.tiles_repeated > 0) {
+    std::printf("tiles that failed and were sent again: %llu (engine error bits: %s)\n",
+                static_cast<unsigned long long>(f.tiles_repeated), repeated_errors(f).c_str());
+  }
+  if (f.tiles_unconfirmed > 0) {
+    std::printf("the chip fell silent when every cell had arrived: it did not say that the last tile had no error\n");
+  } else if (f.counters_after.empty()) {
+    std::printf("the chip fell silent when every cell had arrived: its counters at the end are not known\n");
+  }
+}
+
+void print_summary(const DepthOptions& o, const SweepSetup& setup, const EngineRun& run) {
+  const std::vector<uint8_t>& mask = run.result.mask.data;
+  const auto found = static_cast<double>(std::count(mask.begin(), mask.end(), 0));
   std::printf("%s: %dx%d, %d planes %g .. %g m, window %d: %.2f %% of the cells have a depth, %.2f s\n",
               o.engine.c_str(), setup.rig.width, setup.rig.height, setup.spacing.planes, setup.spacing.zmin,
-              setup.spacing.zmax, setup.format.window,
-              100.0 * static_cast<double>(found) / static_cast<double>(result.mask.data.size()), run.seconds);
+              setup.spacing.zmax, setup.format.window, 100.0 * found / static_cast<double>(mask.size()), run.seconds);
   if (run.rtl) {
     const auto clocks = static_cast<double>(run.rtl->clocks_in_all);
     std::printf("configuration %s: %d tiles, %.3f M clocks = %.3f s at 166 MHz, %.3f s at 300 MHz\n",
                 run.rtl->configuration.c_str(), run.tiles, clocks / 1e6, clocks / 166e6, clocks / 300e6);
   }
-  if (run.link) {
-    const net::LinkFigures& f = run.link->figures;
-    const net::LinkStatistics& s = run.link->statistics;
-    const double mhz = 1e-3 * run.link->chip.config.clk_khz;
-    std::printf(
-        "link %s: %d tiles, %.2f s; %.2f Mbit/s up, %.2f Mbit/s down; lost %llu, resent %llu; %.3f M engine "
-        "clocks = %.3f s at %.0f MHz\n",
-        run.link->peer.c_str(), run.tiles, f.seconds, 8e-6 * static_cast<double>(f.pixel_bytes) / f.seconds,
-        8e-6 * static_cast<double>(f.cell_bytes) / f.seconds, static_cast<unsigned long long>(s.lost),
-        static_cast<unsigned long long>(s.resent), 1e-6 * static_cast<double>(f.engine_clocks),
-        1e-6 * static_cast<double>(f.engine_clocks) / mhz, mhz);
-    if (f.tiles_repeated > 0) {
-      std::printf("tiles that failed and were sent again: %llu (engine error bits: %s)\n",
-                  static_cast<unsigned long long>(f.tiles_repeated), repeated_errors(f).c_str());
-    }
-    if (f.tiles_unconfirmed > 0) {
-      std::printf("the chip fell silent when every cell had arrived: it did not say that the last tile had no error\n");
-    } else if (f.counters_after.empty()) {
-      std::printf("the chip fell silent when every cell had arrived: its counters at the end are not known\n");
-    }
-  }
+  if (run.link) print_link(*run.link, run.tiles);
+}
+
+}  // namespace
+
+void depth_command(const DepthOptions& o) {
+  const auto start = std::chrono::steady_clock::now();
+  check_options(o);
+  Input in = read_input(o);
+  OutputDir out(o.output);
+  if (in.calibration.raw) rectify(in);
+  const SweepSetup setup = make_setup(o, in);
+  EngineRun run = sweep(o, setup, in);
+  if (o.cleanup) clean(o, setup, run.result);
+  write_images(out, setup, in, run.result);
+  RunRecord record = make_record(o, setup, in, run);
+  record.json["seconds_in_all"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  write_record(out.file("report.json"), record);
+  out.commit(output_names());
+  if (o.quiet) return;
+  print_summary(o, setup, run);
   std::printf("written: %s\n", out.target().c_str());
 }
 

@@ -70,7 +70,7 @@ void append(NewSignal& s, uint64_t clock, const std::string& bits) {
 }
 
 // Signals in scope `cell` that tell which cell is at a group of signals.
-void add_sideband(const Capture& c, const LayoutGroup& group, const std::array<Beats, kPlaces>& beats,
+void add_sideband(const Capture& c, const LayoutGroup& group, const std::vector<Beats>& beats,
                   std::map<std::string, NewSignal>& added) {
   const std::string scope = group.module + '.' + group.name + '.';
   if (added.count(scope + "here")) return;
@@ -158,166 +158,220 @@ std::vector<Layout> read_layouts(const std::string& folder, const Engine& engine
   return layouts;
 }
 
-Capture capture(const Engine& engine, const scene::Stimulus& stimulus, const Cell& cell,
-                const std::vector<Layout>& layouts, const std::string& file) {
-  check_cell(engine, stimulus, cell);
-  const golden::Config& config = engine.config;
-  const golden::TileJob& t = stimulus.job;
-  Capture c;
-  c.engine = &engine;
-  c.stimulus = stimulus;
-  c.cell = cell;
-  c.fst = file;
-  c.lane = cell.plane % config.lanes;
-  c.set = cell.plane / config.lanes;
-  c.keys = engine.keys;
-  c.keys["lane"] = c.lane;
+namespace {
 
-  // First run: when does the cell come, and its window, and its set?
-  const auto cols = static_cast<uint64_t>(golden::sweep_cols(config, t));
-  const auto set_samples = cols * static_cast<uint64_t>(golden::sweep_rows(config, t));
-  const auto set = static_cast<uint64_t>(c.set), skirt = static_cast<uint64_t>(config.window - 1);
-  const auto column = static_cast<uint64_t>(cell.column), row = static_cast<uint64_t>(cell.row);
-  const uint64_t set_begin = set * set_samples, window_begin = set_begin + row * cols + column,
-                 window_end = window_begin + skirt * cols + skirt;
-  const uint64_t cell_number =
-      (set * static_cast<uint64_t>(t.tile_rows) + row) * static_cast<uint64_t>(t.tile_cols) + column;
-  std::vector<uint64_t> samples{set_begin};
-  if (window_begin != set_begin) samples.push_back(window_begin);
-  samples.push_back(window_end);
-  Run run;
-  run.stimulus = &stimulus;
-  run.lane = c.lane;
-  run.wanted = {samples, samples, samples, {cell_number}, {cell_number}};
-  const RunLog log = engine.run(config, run);
-  for (int tap = 0; tap < kTaps; ++tap) {
-    if (log.clocks[tap].size() != run.wanted[tap].size())
-      throw WaveError("the cell does not come to " + std::string(place_name(tap + 1)));
-    c.here[tap + 1] = log.clocks[tap].back();
-    c.entered[tap + 1] = tap < kSim ? log.clocks[tap][samples.size() - 2] : c.here[tap + 1];
+// The two runs of a capture, and what is made of the second one's waves.
+class Capturing {
+ public:
+  Capturing(const Engine& engine, const scene::Stimulus& stimulus, const Cell& cell, const std::vector<Layout>& layouts,
+            const std::string& file)
+      : engine_(engine), layouts_(layouts) {
+    const golden::Config& config = engine.config;
+    c_.engine = &engine;
+    c_.stimulus = stimulus;
+    c_.cell = cell;
+    c_.fst = file;
+    c_.lane = cell.plane % config.lanes;
+    c_.set = cell.plane / config.lanes;
+    c_.keys = engine.keys;
+    c_.keys["lane"] = c_.lane;
+    run_.stimulus = &stimulus;
+    run_.lane = c_.lane;
   }
-  c.cells = log.cells;
 
-  // Second run: the same with waves, from the beginning of the set on.
-  run.fst = file + ".full";
-  run.first = sub(log.clocks[kSample][0], kLead);
-  run.last = c.here[kMapWrite] + kBehind;
-  const RunLog full_log = engine.run(config, run);
-  const FstReader full(run.fst);
-  if (full_log.clocks != log.clocks) throw WaveError("two runs differ");
+  Capture capture() {
+    find_cell();
+    run_with_waves();
+    const FstReader full(run_.fst);
+    last_ = std::min(run_.last, full_log_.last_clock - 1);
+    find_parts(full);
+    const Values values(full, wanted_);
+    number_beats(values);
+    add_sidebands();
+    add_parts(values);
+    write(full);
+    std::remove(run_.fst.c_str());
+    return std::move(c_);
+  }
 
-  // What is where, clock by clock.
-  const uint64_t last = std::min(run.last, full_log.last_clock - 1);
-  std::array<Beats, kPlaces> beats{Beats(run.first, last), Beats(run.first, last), Beats(run.first, last),
-                                   Beats(run.first, last), Beats(run.first, last), Beats(run.first, last)};
-  auto handle = [&](const std::string& name) { return full.get("psweep." + name).handle; };
-  const uint32_t valid[kTaps] = {handle("dbg_sample_valid"), handle("dbg_quad_valid"), handle("dbg_interp_valid"),
-                                 handle("dbg_sim_valid"), handle("dbg_map_we")};
-  const uint32_t control_valid = handle("u_control.m_valid"), control_row = handle("u_control.m_row_first"),
-                 control_plane = handle("u_control.m_plane_first"), control_set = handle("u_control.m_plane");
-  std::vector<uint32_t> wanted(valid, valid + kTaps);
-  wanted.insert(wanted.end(), {control_valid, control_row, control_plane, control_set});
-
-  std::map<std::string, NewSignal> added;
+ private:
   struct Part {
     uint32_t from;
     int low, width;
     std::string path;
     const LayoutGroup* held;  // nullptr: all values, else that at the cell's clock in this group
   };
-  std::vector<Part> parts;
-  for (const Layout& layout : layouts) {
-    for (const LayoutGroup& group : layout.groups) {
-      const std::string scope = scope_of(full, group.module, group.module_per_lane, c.lane);
-      for (const LayoutSignal& s : group.signals) {
-        const Signal* found = nullptr;
-        for (const Signal& candidate : full.signals())
-          if (candidate.path.size() > scope.size() + s.name.size() &&
-              candidate.path.compare(candidate.path.size() - scope.size() - s.name.size() - 1, std::string::npos,
-                                     scope + '.' + s.name) == 0)
-            found = &candidate;
-        if (!found) throw WaveError(signal_error(layout, s, "no signal " + s.name + " in " + scope));
-        const auto part = part_of(c, s, found->width);
-        if (!part) continue;
-        if (s.held && !group.timed) throw WaveError(signal_error(layout, s, "held in a group without an offset"));
-        if (part->first < 0 || part->first + part->second > found->width)
-          throw WaveError(signal_error(layout, s, s.name + " has only " + std::to_string(found->width) + " bits"));
-        parts.push_back({found->handle, part->first, part->second, part_path(group, s), s.held ? &group : nullptr});
-        wanted.push_back(found->handle);
+
+  // First run: when does the cell come, and its window, and its set?
+  void find_cell() {
+    const golden::Config& config = engine_.config;
+    const golden::TileJob& t = c_.stimulus.job;
+    const auto cols = static_cast<uint64_t>(golden::sweep_cols(config, t));
+    const auto set_samples = cols * static_cast<uint64_t>(golden::sweep_rows(config, t));
+    const auto set = static_cast<uint64_t>(c_.set), skirt = static_cast<uint64_t>(config.window - 1);
+    const auto column = static_cast<uint64_t>(c_.cell.column), row = static_cast<uint64_t>(c_.cell.row);
+    set_begin_ = set * set_samples;
+    window_begin_ = set_begin_ + row * cols + column;
+    window_end_ = window_begin_ + skirt * cols + skirt;
+    const uint64_t cell_number =
+        (set * static_cast<uint64_t>(t.tile_rows) + row) * static_cast<uint64_t>(t.tile_cols) + column;
+    std::vector<uint64_t> samples{set_begin_};
+    if (window_begin_ != set_begin_) samples.push_back(window_begin_);
+    samples.push_back(window_end_);
+    run_.wanted = {samples, samples, samples, {cell_number}, {cell_number}};
+    log_ = engine_.run(config, run_);
+    for (int tap = 0; tap < kTaps; ++tap) {
+      if (log_.clocks[tap].size() != run_.wanted[tap].size())
+        throw WaveError("the cell does not come to " + std::string(place_name(tap + 1)));
+      c_.here[tap + 1] = log_.clocks[tap].back();
+      c_.entered[tap + 1] = tap < kSim ? log_.clocks[tap][samples.size() - 2] : c_.here[tap + 1];
+    }
+    c_.cells = log_.cells;
+  }
+
+  // Second run: the same with waves, from the beginning of the set on.
+  void run_with_waves() {
+    run_.fst = c_.fst + ".full";
+    run_.first = sub(log_.clocks[kSample][0], kLead);
+    run_.last = c_.here[kMapWrite] + kBehind;
+    full_log_ = engine_.run(engine_.config, run_);
+    if (full_log_.clocks != log_.clocks) throw WaveError("two runs differ");
+  }
+
+  // The signals that are read: those that number the beats, and the layouts' parts.
+  void find_parts(const FstReader& full) {
+    auto handle = [&](const std::string& name) { return full.get("psweep." + name).handle; };
+    valid_ = {handle("dbg_sample_valid"), handle("dbg_quad_valid"), handle("dbg_interp_valid"), handle("dbg_sim_valid"),
+              handle("dbg_map_we")};
+    control_valid_ = handle("u_control.m_valid"), control_row_ = handle("u_control.m_row_first");
+    control_plane_ = handle("u_control.m_plane_first"), control_set_ = handle("u_control.m_plane");
+    wanted_.assign(valid_.begin(), valid_.end());
+    wanted_.insert(wanted_.end(), {control_valid_, control_row_, control_plane_, control_set_});
+    for (const Layout& layout : layouts_) {
+      for (const LayoutGroup& group : layout.groups) {
+        const std::string scope = scope_of(full, group.module, group.module_per_lane, c_.lane);
+        for (const LayoutSignal& s : group.signals) find_part(full, layout, group, s, scope);
       }
     }
   }
-  const Values values(full, wanted);
+  void find_part(const FstReader& full, const Layout& layout, const LayoutGroup& group, const LayoutSignal& s,
+                 const std::string& scope) {
+    const std::string end = scope + '.' + s.name;
+    const Signal* found = nullptr;
+    for (const Signal& candidate : full.signals())
+      if (candidate.path.size() > end.size() - 1 &&
+          candidate.path.compare(candidate.path.size() - end.size(), std::string::npos, end) == 0)
+        found = &candidate;
+    if (!found) throw WaveError(signal_error(layout, s, "no signal " + s.name + " in " + scope));
+    const auto part = part_of(c_, s, found->width);
+    if (!part) return;
+    if (s.held && !group.timed) throw WaveError(signal_error(layout, s, "held in a group without an offset"));
+    if (part->first < 0 || part->first + part->second > found->width)
+      throw WaveError(signal_error(layout, s, s.name + " has only " + std::to_string(found->width) + " bits"));
+    parts_.push_back({found->handle, part->first, part->second, part_path(group, s), s.held ? &group : nullptr});
+    wanted_.push_back(found->handle);
+  }
 
-  std::array<uint64_t, kTaps> count = full_log.before;
-  std::vector<std::pair<uint64_t, bool>> control;  // clock, and whether the set begins
-  for (uint64_t clock = run.first; clock <= last; ++clock) {
-    for (int tap = 0; tap < kTaps; ++tap)
-      if (values.at_clock(valid[tap], clock) >> (tap == kMap ? 0 : c.lane) & 1)
-        beats[static_cast<size_t>(tap + 1)].set(clock, static_cast<int64_t>(count[tap]++));
-    if (!values.at_clock(control_valid, clock)) continue;
-    const bool begins = values.at_clock(control_row, clock) && values.at_clock(control_plane, clock) &&
-                        values.at_clock(control_set, clock) == set;
-    control.emplace_back(clock, begins);
+  // What is where, clock by clock.
+  void number_beats(const Values& values) {
+    beats_.assign(kPlaces, Beats(run_.first, last_));
+    std::array<uint64_t, kTaps> count = full_log_.before;
+    std::vector<std::pair<uint64_t, bool>> control;  // clock, and whether the set begins
+    for (uint64_t clock = run_.first; clock <= last_; ++clock) {
+      for (int tap = 0; tap < kTaps; ++tap)
+        if (values.at_clock(valid_[tap], clock) >> (tap == kMap ? 0 : c_.lane) & 1)
+          beats_[static_cast<size_t>(tap + 1)].set(clock, static_cast<int64_t>(count[tap]++));
+      if (!values.at_clock(control_valid_, clock)) continue;
+      const bool begins = values.at_clock(control_row_, clock) && values.at_clock(control_plane_, clock) &&
+                          values.at_clock(control_set_, clock) == static_cast<uint64_t>(c_.set);
+      control.emplace_back(clock, begins);
+    }
+    const auto begin = std::find_if(control.begin(), control.end(), [](const auto& beat) { return beat.second; });
+    if (begin == control.end()) throw WaveError("control does not begin the set within the dump");
+    for (auto beat = control.begin(); beat != control.end(); ++beat) {
+      const int64_t number = static_cast<int64_t>(set_begin_) + (beat - begin);
+      beats_[kControlOut].set(beat->first, number);
+      if (number == static_cast<int64_t>(window_begin_)) c_.entered[kControlOut] = beat->first;
+      if (number == static_cast<int64_t>(window_end_)) c_.here[kControlOut] = beat->first;
+    }
+    c_.first = std::max(run_.first, sub(c_.entered[kControlOut], kMargin));
+    c_.last = std::min(last_, c_.here[kMapWrite] + kBehind);
   }
-  const auto begin = std::find_if(control.begin(), control.end(), [](const auto& beat) { return beat.second; });
-  if (begin == control.end()) throw WaveError("control does not begin the set within the dump");
-  for (auto beat = control.begin(); beat != control.end(); ++beat) {
-    const int64_t number = static_cast<int64_t>(set_begin) + (beat - begin);
-    beats[kControlOut].set(beat->first, number);
-    if (number == static_cast<int64_t>(window_begin)) c.entered[kControlOut] = beat->first;
-    if (number == static_cast<int64_t>(window_end)) c.here[kControlOut] = beat->first;
-  }
-  c.first = std::max(run.first, sub(c.entered[kControlOut], kMargin));
-  c.last = std::min(last, c.here[kMapWrite] + kBehind);
 
   // The delays in the layouts are those of the hardware: what leaves an entity by its layout enters the next one.
-  for (const Layout& layout : layouts) {
-    for (const LayoutGroup& group : layout.groups) {
-      if (!group.timed) continue;
-      add_sideband(c, group, beats, added);
-      if (group.name != "m" || group.module == "u_control") continue;
-      const auto place = static_cast<size_t>(base_of(group.module));
-      const uint64_t leaves = c.here[place] + static_cast<uint64_t>(group.offset);
-      if (leaves != c.here[place + 1])
-        throw WaveError(layout.file + ": group m of " + group.module + " is at clock " + std::to_string(leaves) +
-                        ", but the cell is handed on at clock " + std::to_string(c.here[place + 1]));
-    }
-  }
-  for (const Part& part : parts) {
-    if (added.count(part.path)) continue;
-    NewSignal s{part.path, part.width, {}};
-    auto field = [&part](const std::string& bits) {
-      return bits.substr(bits.size() - static_cast<size_t>(part.low + part.width), static_cast<size_t>(part.width));
-    };
-    if (part.held) {
-      const uint64_t time = kPicosecondsPerClock * (c.here[static_cast<size_t>(base_of(part.held->module))] +
-                                                    static_cast<uint64_t>(part.held->offset));
-      s.changes.emplace_back(c.first * kPicosecondsPerClock, std::string(static_cast<size_t>(part.width), 'z'));
-      s.changes.emplace_back(time, field(values.bits(part.from, time)));
-    } else {
-      for (const auto& [time, bits] : values.all(part.from)) {
-        if (time > c.last * kPicosecondsPerClock) break;
-        if (time <= c.first * kPicosecondsPerClock) s.changes.clear();
-        if (s.changes.empty() || s.changes.back().second != field(bits)) s.changes.emplace_back(time, field(bits));
+  void add_sidebands() {
+    for (const Layout& layout : layouts_) {
+      for (const LayoutGroup& group : layout.groups) {
+        if (!group.timed) continue;
+        add_sideband(c_, group, beats_, added_);
+        if (group.name != "m" || group.module == "u_control") continue;
+        const auto place = static_cast<size_t>(base_of(group.module));
+        const uint64_t leaves = c_.here[place] + static_cast<uint64_t>(group.offset);
+        if (leaves != c_.here[place + 1])
+          throw WaveError(layout.file + ": group m of " + group.module + " is at clock " + std::to_string(leaves) +
+                          ", but the cell is handed on at clock " + std::to_string(c_.here[place + 1]));
       }
     }
-    added.emplace(part.path, s);
   }
-  std::vector<NewSignal> list;
-  for (const auto& s : added) list.push_back(s.second);
-  std::string root;
-  for (const Signal& s : full.signals()) {
-    const size_t at = s.path.find("psweep.");
-    if (at == 0 || (at != std::string::npos && s.path[at - 1] == '.')) {
-      root = s.path.substr(0, at + 6);
-      break;
+
+  void add_parts(const Values& values) {
+    for (const Part& part : parts_) {
+      if (added_.count(part.path)) continue;
+      NewSignal s{part.path, part.width, {}};
+      auto field = [&part](const std::string& bits) {
+        return bits.substr(bits.size() - static_cast<size_t>(part.low + part.width), static_cast<size_t>(part.width));
+      };
+      if (part.held) {
+        const uint64_t time = kPicosecondsPerClock * (c_.here[static_cast<size_t>(base_of(part.held->module))] +
+                                                      static_cast<uint64_t>(part.held->offset));
+        s.changes.emplace_back(c_.first * kPicosecondsPerClock, std::string(static_cast<size_t>(part.width), 'z'));
+        s.changes.emplace_back(time, field(values.bits(part.from, time)));
+      } else {
+        for (const auto& [time, bits] : values.all(part.from)) {
+          if (time > c_.last * kPicosecondsPerClock) break;
+          if (time <= c_.first * kPicosecondsPerClock) s.changes.clear();
+          if (s.changes.empty() || s.changes.back().second != field(bits)) s.changes.emplace_back(time, field(bits));
+        }
+      }
+      added_.emplace(part.path, s);
     }
   }
-  write_trimmed(full, root, c.first * kPicosecondsPerClock, c.last * kPicosecondsPerClock + kPicosecondsPerClock / 2,
-                list, file);
-  std::remove(run.fst.c_str());
-  return c;
+
+  void write(const FstReader& full) const {
+    std::vector<NewSignal> list;
+    for (const auto& s : added_) list.push_back(s.second);
+    std::string root;
+    for (const Signal& s : full.signals()) {
+      const size_t at = s.path.find("psweep.");
+      if (at == 0 || (at != std::string::npos && s.path[at - 1] == '.')) {
+        root = s.path.substr(0, at + 6);
+        break;
+      }
+    }
+    write_trimmed(full, root, c_.first * kPicosecondsPerClock,
+                  c_.last * kPicosecondsPerClock + kPicosecondsPerClock / 2, list, c_.fst);
+  }
+
+  const Engine& engine_;
+  const std::vector<Layout>& layouts_;
+  Capture c_;
+  Run run_;
+  RunLog log_, full_log_;
+  uint64_t set_begin_ = 0, window_begin_ = 0, window_end_ = 0, last_ = 0;  // samples; the last clock of the dump
+  std::array<uint32_t, kTaps> valid_{};
+  uint32_t control_valid_ = 0, control_row_ = 0, control_plane_ = 0, control_set_ = 0;
+  std::vector<uint32_t> wanted_;
+  std::vector<Part> parts_;
+  std::vector<Beats> beats_;
+  std::map<std::string, NewSignal> added_;
+};
+
+}  // namespace
+
+Capture capture(const Engine& engine, const scene::Stimulus& stimulus, const Cell& cell,
+                const std::vector<Layout>& layouts, const std::string& file) {
+  check_cell(engine, stimulus, cell);
+  return Capturing(engine, stimulus, cell, layouts, file).capture();
 }
 
 void write_save_file(const Capture& c, const Layout& layout, const std::string& file) {

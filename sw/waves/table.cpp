@@ -66,161 +66,210 @@ std::vector<uint64_t> window_clocks(const Capture& c) {
   return clocks;
 }
 
-}  // namespace
+// The table, stage by stage.
+class CellTable {
+ public:
+  CellTable(const Capture& c, const scene::Stimulus& stimulus)
+      : c_(c),
+        stimulus_(stimulus),
+        config_(c.engine->config),
+        job_(stimulus.job),
+        m_(config_.window),
+        cols_(golden::sweep_cols(config_, job_)),
+        i_(c.cell.column + m_ - 1),
+        j_(c.cell.row + m_ - 1),
+        at_(static_cast<size_t>(j_) * cols_ + i_),
+        trace_(trace_of(c, stimulus, c.cell.plane)),
+        probe_(c) {}
 
-std::vector<TableRow> compare_cell(const Capture& c, const scene::Stimulus& stimulus) {
-  const golden::Config& config = c.engine->config;
-  const golden::TileJob& t = stimulus.job;
-  const int m = config.window, cols = golden::sweep_cols(config, t), lanes = config.lanes;
-  const int i = c.cell.column + m - 1, j = c.cell.row + m - 1;
-  const size_t at = static_cast<size_t>(j) * cols + i;
-  const golden::PlaneTrace trace = trace_of(c, stimulus, c.cell.plane);
-  const golden::Sample &l = trace.left[at], &r = trace.right[at];
-  const golden::SampleFlags flags = trace.flags[at];
-  const Probe probe(c);
-  std::vector<TableRow> rows;
+  std::vector<TableRow> rows() {
+    control();
+    address_generator();
+    storage();
+    interpolation();
+    similarity();
+    updating();
+    unloaded();
+    return std::move(rows_);
+  }
 
-  std::string stage, module, place;
-  bool per_lane = false;
-  uint64_t base = 0;
-  auto enter = [&](const char* name, const char* instance, bool one_per_lane, int where, bool is_sample) {
-    stage = name, module = instance, per_lane = one_per_lane;
-    base = c.here[static_cast<size_t>(where)];
-    place = std::to_string(c.cell.plane) + (is_sample ? ": sample " : ": cell ") +
-            std::to_string(is_sample ? i : c.cell.column) + ',' + std::to_string(is_sample ? j : c.cell.row);
-  };
+ private:
   struct Options {
     int fraction = -1;
     bool lane = false, is_signed = false, compared = true;
   };
-  auto add = [&](const char* what, const std::string& signal, int offset, int64_t golden, const Options& o) {
+  static constexpr Options kSigned{-1, false, true, true};
+
+  void enter(const char* name, const char* instance, bool one_per_lane, int where, bool is_sample) {
+    stage_ = name, module_ = instance, per_lane_ = one_per_lane;
+    base_ = c_.here[static_cast<size_t>(where)];
+    place_ = std::to_string(c_.cell.plane) + (is_sample ? ": sample " : ": cell ") +
+             std::to_string(is_sample ? i_ : c_.cell.column) + ',' + std::to_string(is_sample ? j_ : c_.cell.row);
+  }
+  void add(const std::string& what, const std::string& signal, int offset, int64_t golden, const Options& o) {
     TableRow row;
-    row.stage = stage, row.what = what, row.sample = place;
-    row.clock = base + static_cast<uint64_t>(offset);
+    row.stage = stage_, row.what = what, row.sample = place_;
+    row.clock = base_ + static_cast<uint64_t>(offset);
     row.golden = golden;
-    row.rtl = probe.at(module, per_lane, signal, row.clock, o.lane, o.is_signed);
+    row.rtl = probe_.at(module_, per_lane_, signal, row.clock, o.lane, o.is_signed);
     row.fraction = o.fraction, row.compared = o.compared;
-    rows.push_back(row);
-  };
+    rows_.push_back(row);
+  }
 
-  enter("control", "u_control", false, kControlOut, true);
-  add("column of the sample", "col", -1, i, {});  // counted a clock before the strobes
-  add("row of the sample", "row", -1, j, {});
-  add("set of planes", "m_plane", 0, c.set, {});
+  void control() {
+    enter("control", "u_control", false, kControlOut, true);
+    add("column of the sample", "col", -1, i_, {});  // counted a clock before the strobes
+    add("row of the sample", "row", -1, j_, {});
+    add("set of planes", "m_plane", 0, c_.set, {});
+  }
 
-  enter("address_generator", "u_address_generator", true, kAddressOut, true);
-  const int w = config.weight_bits;
-  add("left xi", "m_xi_left", 0, l.xi, {-1, false, true, true});
-  add("left fx", "m_fx_left", 0, l.fx, {w, false, false, true});
-  add("left yi", "m_yi_left", 0, l.yi, {-1, false, true, true});
-  add("left fy", "m_fy_left", 0, l.fy, {w, false, false, true});
-  add("right xi", "m_xi_right", 0, r.xi, {-1, false, true, true});
-  add("right fx", "m_fx_right", 0, r.fx, {w, false, false, true});
-  add("right yi", "m_yi_right", 0, r.yi, {-1, false, true, true});
-  add("right fy", "m_fy_right", 0, r.fy, {w, false, false, true});
-  add("window error", "m_window_error", 0, flags.window_error, {});
+  void address_generator() {
+    enter("address_generator", "u_address_generator", true, kAddressOut, true);
+    const Options fraction{config_.weight_bits, false, false, true};
+    const golden::Sample &l = trace_.left[at_], &r = trace_.right[at_];
+    add("left xi", "m_xi_left", 0, l.xi, kSigned);
+    add("left fx", "m_fx_left", 0, l.fx, fraction);
+    add("left yi", "m_yi_left", 0, l.yi, kSigned);
+    add("left fy", "m_fy_left", 0, l.fy, fraction);
+    add("right xi", "m_xi_right", 0, r.xi, kSigned);
+    add("right fx", "m_fx_right", 0, r.fx, fraction);
+    add("right yi", "m_yi_right", 0, r.yi, kSigned);
+    add("right fy", "m_fy_right", 0, r.fy, fraction);
+    add("window error", "m_window_error", 0, trace_.flags[at_].window_error, {});
+  }
 
-  enter("storage", "u_storage", false, kStorageOut, true);
-  auto quad = [&](const char* side, const golden::Pixels& image, const golden::Sample& s) {
-    const golden::Quad q = flags.usable ? golden::fetch(config, image, s) : golden::Quad{};
-    const std::string end = std::string("_") + side;
+  void storage() {
+    enter("storage", "u_storage", false, kStorageOut, true);
+    quad("left", stimulus_.left, trace_.left[at_]);
+    quad("right", stimulus_.right, trace_.right[at_]);
+  }
+  void quad(const std::string& side, const golden::Pixels& image, const golden::Sample& s) {
+    const bool usable = trace_.flags[at_].usable;
+    const golden::Quad q = usable ? golden::fetch(config_, image, s) : golden::Quad{};
     const struct {
       const char* name;
       int golden;
     } pixels[] = {{"p00", q.p00}, {"p10", q.p10}, {"p01", q.p01}, {"p11", q.p11}};
     for (const auto& p : pixels)
-      add((std::string(side) + ' ' + p.name).c_str(), std::string("m_") + p.name + end, 0, p.golden,
-          {-1, true, false, flags.usable});
-  };
-  quad("left", stimulus.left, l);
-  quad("right", stimulus.right, r);
-
-  enter("interpolation", "u_interpolation", true, kInterpolationOut, true);
-  add("left sample", "m_l", 0, trace.l[at], {config.interp_frac, false, false, true});
-  add("right sample", "m_r", 0, trace.r[at], {config.interp_frac, false, false, true});
-
-  enter("similarity", "u_similarity", true, kInterpolationOut, false);
-  golden::Sums sums;
-  const int64_t half = int64_t{1} << (config.sample_bits() - 1);
-  int64_t equal = 0;
-  const std::vector<uint64_t> clocks = window_clocks(c);
-  for (int dj = 0; dj < m; ++dj) {
-    for (int di = 0; di < m; ++di) {
-      const size_t here = static_cast<size_t>(c.cell.row + dj) * cols + static_cast<size_t>(c.cell.column + di);
-      const uint64_t clock = clocks[static_cast<size_t>(dj * m + di)];
-      sums.add(trace.l[here] - half, half - 1 - trace.r[here]);
-      equal += probe.at(module, true, "s_l", clock) == trace.l[here] &&
-               probe.at(module, true, "s_r", clock) == trace.r[here];
-    }
+      add(side + ' ' + p.name, std::string("m_") + p.name + '_' + side, 0, p.golden, {-1, true, false, usable});
   }
-  TableRow samples;
-  samples.stage = stage, samples.what = "equal samples of the window", samples.sample = place, samples.clock = base;
-  samples.golden = static_cast<int64_t>(m) * m;
-  samples.rtl = equal;
-  rows.push_back(samples);
-  // As the entity sees them: left less half the range, right mirrored, so that the covariance changes its sign.
-  const int64_t n = samples.golden;
-  // The -1 of the last line comes with the left sum: S^2 - 1 = (S + 1) (S - 1).
-  add("sum of l' - 1", "s8_l", 8, sums.l - 1, {-1, false, true, true});
-  add("sum of r'", "s8_r", 8, sums.r, {-1, false, true, true});
-  add("-n sum of l' r'", "s10_x", 10, -n * sums.x, {-1, false, true, true});
-  // Modulo 2^bits, bits those of n^2 (var + var): the entity needs no more of it.
-  int bits = 2 * config.sample_bits() - 1;
-  while ((int64_t{1} << bits) < (n * n << (2 * config.sample_bits() - 1))) ++bits;
-  add("-n sum of l'^2 + r'^2", "s10_y", 10, (-n * sums.y) & ((int64_t{1} << bits) - 1), {});
-  add("n^2 cov", "s12_half", 12, -sums.covariance(n), {-1, false, true, true});
-  add("-n^2 (var + var) - 1", "s12_nden", 12, -sums.variances(n) - 1, {-1, false, true, true});
-  const golden::Similarity s = similarity_of(c, trace);
-  base = c.here[kSimilarityOut];
-  add("inside", "m_inside", 0, s.valid, {});
-  add("textured", "m_textured", 0, s.textured, {});
-  add("V", "m_v", 0, s.v, {config.mncc_bits, false, false, true});
+
+  void interpolation() {
+    enter("interpolation", "u_interpolation", true, kInterpolationOut, true);
+    add("left sample", "m_l", 0, trace_.l[at_], {config_.interp_frac, false, false, true});
+    add("right sample", "m_r", 0, trace_.r[at_], {config_.interp_frac, false, false, true});
+  }
+
+  void similarity() {
+    enter("similarity", "u_similarity", true, kInterpolationOut, false);
+    const golden::Sums sums = window_sums();
+    // As the entity sees them: left less half the range, right mirrored, so that the covariance changes its sign.
+    const int64_t n = static_cast<int64_t>(m_) * m_;
+    // The -1 of the last line comes with the left sum: S^2 - 1 = (S + 1) (S - 1).
+    add("sum of l' - 1", "s8_l", 8, sums.l - 1, kSigned);
+    add("sum of r'", "s8_r", 8, sums.r, kSigned);
+    add("-n sum of l' r'", "s10_x", 10, -n * sums.x, kSigned);
+    // Modulo 2^bits, bits those of n^2 (var + var): the entity needs no more of it.
+    int bits = 2 * config_.sample_bits() - 1;
+    while ((int64_t{1} << bits) < (n * n << (2 * config_.sample_bits() - 1))) ++bits;
+    add("-n sum of l'^2 + r'^2", "s10_y", 10, (-n * sums.y) & ((int64_t{1} << bits) - 1), {});
+    add("n^2 cov", "s12_half", 12, -sums.covariance(n), kSigned);
+    add("-n^2 (var + var) - 1", "s12_nden", 12, -sums.variances(n) - 1, kSigned);
+    const golden::Similarity s = similarity_of(c_, trace_);
+    base_ = c_.here[kSimilarityOut];
+    add("inside", "m_inside", 0, s.valid, {});
+    add("textured", "m_textured", 0, s.textured, {});
+    add("V", "m_v", 0, s.v, {config_.mncc_bits, false, false, true});
+  }
+  // Of the model; all samples of the window are compared on the way.
+  golden::Sums window_sums() {
+    golden::Sums sums;
+    const int64_t half = int64_t{1} << (config_.sample_bits() - 1);
+    const std::vector<uint64_t> clocks = window_clocks(c_);
+    TableRow row;
+    for (int dj = 0; dj < m_; ++dj) {
+      for (int di = 0; di < m_; ++di) {
+        const size_t here = static_cast<size_t>(c_.cell.row + dj) * cols_ + static_cast<size_t>(c_.cell.column + di);
+        const uint64_t clock = clocks[static_cast<size_t>(dj * m_ + di)];
+        sums.add(trace_.l[here] - half, half - 1 - trace_.r[here]);
+        row.rtl += probe_.at(module_, true, "s_l", clock) == trace_.l[here] &&
+                   probe_.at(module_, true, "s_r", clock) == trace_.r[here];
+      }
+    }
+    row.stage = stage_, row.what = "equal samples of the window", row.sample = place_, row.clock = base_;
+    row.golden = static_cast<int64_t>(m_) * m_;
+    rows_.push_back(row);
+    return sums;
+  }
 
   // The word before the set, and after all its planes.
-  enter("updating", "u_updating", false, kSimilarityOut, false);
-  golden::Cell word;
-  const int set_begin = c.set * lanes, set_end = std::min(set_begin + lanes, t.planes);
-  auto advance = [&](int from, int to) {
+  void updating() {
+    enter("updating", "u_updating", false, kSimilarityOut, false);
+    const int set_begin = c_.set * config_.lanes, set_end = std::min(set_begin + config_.lanes, job_.planes);
+    advance(0, set_begin);
+    add("address read", "read_cell", 0, address(), {});
+    add_word("before", "word_", 2, c_.set > 0);  // the first set ignores what it reads
+    advance(set_begin, set_end);
+    base_ = c_.here[kMapWrite];
+    add("address written", "dbg_map_addr", 0, address(), {});
+    add_word("after", "dbg_map_", 0, true);
+    advance(set_end, job_.planes);
+  }
+  int64_t address() const { return int64_t{c_.cell.row} * job_.tile_cols + c_.cell.column; }
+  void advance(int from, int to) {
     for (int k = from; k < to; ++k)
-      word = golden::update(config, word, k, similarity_of(c, k == c.cell.plane ? trace : trace_of(c, stimulus, k)));
-  };
-  auto add_word = [&](const std::string& when, const std::string& prefix, int offset, bool compared) {
-    const std::string ok = prefix == "word_" ? "word_" : "dbg_map_";
-    add(("best " + when).c_str(), ok + "best", offset, word.best, {config.mncc_bits, false, false, compared});
-    add(("prev " + when).c_str(), ok + "prev", offset, word.prev, {config.mncc_bits, false, false, compared});
-    add(("plane " + when).c_str(), ok + "plane", offset, word.plane, {-1, false, false, compared});
-    add(("frac " + when).c_str(), ok + "frac", offset, word.frac, {config.frac_bits, false, false, compared});
-    add(("local_max " + when).c_str(), ok + "local_max", offset, word.local_max, {-1, false, false, compared});
-    add(("prev_valid " + when).c_str(), ok + "prev_valid", offset, word.prev_valid, {-1, false, false, compared});
-  };
-  const int64_t address = int64_t{c.cell.row} * t.tile_cols + c.cell.column;
-  advance(0, set_begin);
-  add("address read", "read_cell", 0, address, {});
-  add_word("before", "word_", 2, c.set > 0);  // the first set ignores what it reads
-  advance(set_begin, set_end);
-  base = c.here[kMapWrite];
-  add("address written", "dbg_map_addr", 0, address, {});
-  add_word("after", "dbg_map_", 0, true);
+      word_ = golden::update(config_, word_, k,
+                             similarity_of(c_, k == c_.cell.plane ? trace_ : trace_of(c_, stimulus_, k)));
+  }
+  void add_word(const std::string& when, const std::string& prefix, int offset, bool compared) {
+    const Options v{config_.mncc_bits, false, false, compared}, whole{-1, false, false, compared};
+    add("best " + when, prefix + "best", offset, word_.best, v);
+    add("prev " + when, prefix + "prev", offset, word_.prev, v);
+    add("plane " + when, prefix + "plane", offset, word_.plane, whole);
+    add("frac " + when, prefix + "frac", offset, word_.frac, {config_.frac_bits, false, false, compared});
+    add("local_max " + when, prefix + "local_max", offset, word_.local_max, whole);
+    add("prev_valid " + when, prefix + "prev_valid", offset, word_.prev_valid, whole);
+  }
 
   // What leaves in the end, long behind the waves.
-  advance(set_end, t.planes);
-  const golden::MapCell model = golden::unload(word, t.threshold);
-  if (c.cells.size() <= static_cast<size_t>(address)) throw WaveError("the map is too short");
-  const golden::MapCell& out = c.cells[static_cast<size_t>(address)];
-  const struct {
-    const char* what;
-    int golden, rtl, fraction;
-  } fields[] = {{"mask", model.mask, out.mask, -1},
-                {"plane", model.plane, out.plane, -1},
-                {"frac", model.frac, out.frac, config.frac_bits},
-                {"V", model.v, out.v, config.mncc_bits}};
-  for (const auto& f : fields) {
-    TableRow row;
-    row.stage = "map, unloaded", row.what = f.what, row.golden = f.golden, row.rtl = f.rtl, row.fraction = f.fraction;
-    row.sample = "all: cell " + std::to_string(c.cell.column) + ',' + std::to_string(c.cell.row);
-    rows.push_back(row);
+  void unloaded() {
+    const golden::MapCell model = golden::unload(word_, job_.threshold);
+    if (c_.cells.size() <= static_cast<size_t>(address())) throw WaveError("the map is too short");
+    const golden::MapCell& out = c_.cells[static_cast<size_t>(address())];
+    const struct {
+      const char* what;
+      int golden, rtl, fraction;
+    } fields[] = {{"mask", model.mask, out.mask, -1},
+                  {"plane", model.plane, out.plane, -1},
+                  {"frac", model.frac, out.frac, config_.frac_bits},
+                  {"V", model.v, out.v, config_.mncc_bits}};
+    for (const auto& f : fields) {
+      TableRow row;
+      row.stage = "map, unloaded", row.what = f.what, row.golden = f.golden, row.rtl = f.rtl, row.fraction = f.fraction;
+      row.sample = "all: cell " + std::to_string(c_.cell.column) + ',' + std::to_string(c_.cell.row);
+      rows_.push_back(row);
+    }
   }
-  return rows;
+
+  const Capture& c_;
+  const scene::Stimulus& stimulus_;
+  const golden::Config& config_;
+  const golden::TileJob& job_;
+  const int m_, cols_, i_, j_;  // window; samples a row; the sample in the lower right corner of the cell's window
+  const size_t at_;
+  const golden::PlaneTrace trace_;
+  const Probe probe_;
+  std::vector<TableRow> rows_;
+  std::string stage_, module_, place_;
+  bool per_lane_ = false;
+  uint64_t base_ = 0;
+  golden::Cell word_;
+};
+
+}  // namespace
+
+std::vector<TableRow> compare_cell(const Capture& c, const scene::Stimulus& stimulus) {
+  return CellTable(c, stimulus).rows();
 }
 
 size_t differences(const std::vector<TableRow>& rows) {

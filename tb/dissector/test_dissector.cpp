@@ -5,6 +5,7 @@
 // scripts each case says SKIPPED and why.
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <random>
 
 #include "contract/registers.hpp"
@@ -214,47 +215,67 @@ std::vector<golden::MapCell> random_cells(Random& random, const golden::Config& 
 }
 
 // One message of every kind. Those of a chip that has told its layout, or not.
-std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout, bool small) {
-  std::vector<Message> all;
-  const int most = small ? 3 : 40;
+class AllKinds {
+ public:
+  AllKinds(Random& random, const Layout& layout, bool small) : random_(random), layout_(layout), small_(small) {}
+
+  std::vector<Message> messages() {
+    padded(open_request(request(net::kOpen), random_.bits(32)));
+    bare_requests();
+    table_requests();
+    padded(start_request(request(net::kStart), start_fields(), layout_));
+    write_requests();
+    padded(read_request(request(net::kRead), static_cast<uint16_t>(random_.coin() ? random_.bits(16) : random_.bits(1)),
+                        static_cast<uint16_t>(random_.bits(16))));
+    set_requests();
+    strangers();
+    status_replies();
+    other_replies();
+    map_packets();
+    return std::move(all_);
+  }
+
+ private:
   // Flags, codes and the byte behind them are anything in requests.
-  auto request = [&](uint8_t type) { return random_header(random, type, static_cast<uint8_t>(random.bits(8))); };
-  auto reply = [&](uint8_t type, int code = -1) {
-    return random_header(random, static_cast<uint8_t>(type | net::kReply),
-                         static_cast<uint8_t>(code >= 0 ? code : random.between(0, 6)));
-  };
-  auto padded = [&](Message m) {
-    m.padding(random.bytes(random.between(0, 5)));
-    all.push_back(std::move(m));
-  };
-  padded(open_request(request(net::kOpen), random.bits(32)));
-  for (const uint8_t type : {net::kClose, net::kInfo, net::kCounters, net::kStatus, net::kRelease})
-    padded(bare_request(request(type), static_cast<uint8_t>(random.bits(8))));
-  // As the host sends them.
-  for (const uint8_t type : {net::kInfo, net::kCounters}) {
-    Message m = bare_request(request(type));
-    const size_t least = type == net::kInfo ? net::kInfoRequestBytes : net::kCountersRequestBytes;
-    m.padding(Bytes(least - net::kHeaderBytes + random.bits(2), 0));
-    all.push_back(std::move(m));
+  net::Header request(uint8_t type) { return random_header(random_, type, static_cast<uint8_t>(random_.bits(8))); }
+  net::Header reply(uint8_t type, int code = -1) {
+    return random_header(random_, static_cast<uint8_t>(type | net::kReply),
+                         static_cast<uint8_t>(code >= 0 ? code : random_.between(0, 6)));
   }
-  {
+  void padded(Message m) {
+    m.padding(random_.bytes(random_.between(0, 5)));
+    all_.push_back(std::move(m));
+  }
+
+  void bare_requests() {
+    for (const uint8_t type : {net::kClose, net::kInfo, net::kCounters, net::kStatus, net::kRelease})
+      padded(bare_request(request(type), static_cast<uint8_t>(random_.bits(8))));
+    // As the host sends them.
+    for (const uint8_t type : {net::kInfo, net::kCounters}) {
+      Message m = bare_request(request(type));
+      const size_t least = type == net::kInfo ? net::kInfoRequestBytes : net::kCountersRequestBytes;
+      m.padding(Bytes(least - net::kHeaderBytes + random_.bits(2), 0));
+      all_.push_back(std::move(m));
+    }
+  }
+  void table_requests() {
     auto h = request(net::kTable);
-    h.index = static_cast<uint16_t>(random.between(0, 8000));
-    all.push_back(table_request(h, random.words(random.between(1, small ? 11 : 364))));
-    if (!small) all.push_back(table_request(h, random.words(365)));
-    all.push_back(table_request(h, random.words(2), 3));
+    h.index = static_cast<uint16_t>(random_.between(0, 8000));
+    all_.push_back(table_request(h, random_.words(random_.between(1, small_ ? 11 : 364))));
+    if (!small_) all_.push_back(table_request(h, random_.words(365)));
+    all_.push_back(table_request(h, random_.words(2), 3));
   }
-  {
+  StartFields start_fields() {
     StartFields s;
-    s.table = static_cast<uint16_t>(random.bits(16));
-    s.zero = static_cast<uint16_t>(random.bits(16));
-    for (uint32_t& w : s.words) w = random.bits(32);
-    const bool consistent = small || random.coin();
+    s.table = static_cast<uint16_t>(random_.bits(16));
+    s.zero = static_cast<uint16_t>(random_.bits(16));
+    for (uint32_t& w : s.words) w = random_.bits(32);
+    const bool consistent = small_ || random_.coin();
     if (consistent) {
-      s.words[2] = static_cast<uint32_t>(random.between(1, 4095));
-      s.words[3] = static_cast<uint32_t>(random.between(1, 4095));
+      s.words[2] = static_cast<uint32_t>(random_.between(1, 4095));
+      s.words[3] = static_cast<uint32_t>(random_.between(1, 4095));
       s.pixels = s.words[2] * s.words[3];
-      const int pairs = layout ? layout->chunk_pairs() : 4096;
+      const int pairs = layout_ ? layout_->chunk_pairs() : 4096;
       s.chunks = (s.pixels + static_cast<uint32_t>(pairs) - 1) / static_cast<uint32_t>(pairs);
       // With the smallest chunks of the widest pixels there are more than an index can count.
       if (s.chunks > 65535) {
@@ -263,73 +284,88 @@ std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout,
         s.chunks = (s.pixels + static_cast<uint32_t>(pairs) - 1) / static_cast<uint32_t>(pairs);
       }
     } else {
-      s.pixels = random.coin() ? random.bits(32) : 0;
-      s.chunks = random.coin() ? random.bits(17) : 0;
+      s.pixels = random_.coin() ? random_.bits(32) : 0;
+      s.chunks = random_.coin() ? random_.bits(17) : 0;
     }
-    padded(start_request(request(net::kStart), s, layout));
+    return s;
   }
-  for (const uint8_t flags : {uint8_t{0}, net::kFlagAnswer}) {
-    auto h = request(net::kWrite);
-    h.flags = flags;
-    const int exact = layout ? layout->chunk_pairs() * layout->pair_bytes() : 24;
-    const int size = small ? 9 : random.coin() ? exact : random.between(1, 1456);
-    all.push_back(write_request(h, random.bytes(size), layout));
+  void write_requests() {
+    for (const uint8_t flags : {uint8_t{0}, net::kFlagAnswer}) {
+      auto h = request(net::kWrite);
+      h.flags = flags;
+      const int exact = layout_ ? layout_->chunk_pairs() * layout_->pair_bytes() : 24;
+      const int size = small_ ? 9 : random_.coin() ? exact : random_.between(1, 1456);
+      all_.push_back(write_request(h, random_.bytes(size), layout_));
+    }
   }
-  padded(read_request(request(net::kRead), static_cast<uint16_t>(random.coin() ? random.bits(16) : random.bits(1)),
-                      static_cast<uint16_t>(random.bits(16))));
-  for (int i = 0; i < 2; ++i) {
-    auto h = request(net::kSet);
-    h.index = small ? 0 : static_cast<uint16_t>(random.bits(1));
-    padded(set_request(h, small ? random.bits(1) : random.coin() ? random.bits(2) : random.bits(32)));
+  void set_requests() {
+    for (int i = 0; i < 2; ++i) {
+      auto h = request(net::kSet);
+      h.index = small_ ? 0 : static_cast<uint16_t>(random_.bits(1));
+      padded(set_request(h, small_ ? random_.bits(1) : random_.coin() ? random_.bits(2) : random_.bits(32)));
+    }
   }
-  all.push_back(opaque("unknown request", true, request(0), net::kVersion, random.bytes(7)));
-  all.push_back(opaque("unknown request", true, request(static_cast<uint8_t>(random.between(0x0c, 0xff))),
-                       net::kVersion, random.bytes(random.between(0, 40))));
-  const auto other_version = static_cast<uint8_t>(random.coin() ? 1 : random.between(3, 255));
-  all.push_back(opaque("other version", true, request(static_cast<uint8_t>(random.between(1, 11))), other_version,
-                       random.bytes(6)));
-  all.push_back(opaque("other version", false, reply(static_cast<uint8_t>(random.between(1, 11))), other_version,
-                       random.bytes(6)));
+  // Of unknown types and other versions.
+  void strangers() {
+    all_.push_back(opaque("unknown request", true, request(0), net::kVersion, random_.bytes(7)));
+    all_.push_back(opaque("unknown request", true, request(static_cast<uint8_t>(random_.between(0x0c, 0xff))),
+                          net::kVersion, random_.bytes(random_.between(0, 40))));
+    const auto version = static_cast<uint8_t>(random_.coin() ? 1 : random_.between(3, 255));
+    all_.push_back(opaque("other version", true, request(static_cast<uint8_t>(random_.between(1, 11))), version,
+                          random_.bytes(6)));
+    all_.push_back(
+        opaque("other version", false, reply(static_cast<uint8_t>(random_.between(1, 11))), version, random_.bytes(6)));
+  }
 
-  auto status = [&](const char* what, const net::Header& h) {
-    const int words = layout ? (layout->row_slots + 31) / 32 : random.between(0, small ? 2 : 32);
+  void status(const char* what, const net::Header& h) {
+    const int words = layout_ ? (layout_->row_slots + 31) / 32 : random_.between(0, small_ ? 2 : 32);
     if (may_be_bare(h)) {
       Message m = bare_reply(h);
       m.what = what;
-      if (always_bare(h)) m.padding(random.bytes(random.between(0, 9)));  // not of this chip
-      all.push_back(std::move(m));
+      if (always_bare(h)) m.padding(random_.bytes(random_.between(0, 9)));  // not of this chip
+      all_.push_back(std::move(m));
     }
     if (always_bare(h)) return;
-    Message m = status_reply(h, random_status(random, words), layout);
+    Message m = status_reply(h, random_status(random_, words), layout_);
     m.what = what;
-    all.push_back(std::move(m));
-  };
-  for (const uint8_t type : {net::kOpen, net::kClose, net::kStatus, net::kTable, net::kStart, net::kWrite, net::kRead,
-                             net::kRelease, net::kSet})
-    for (int code = 0; code <= 6; ++code) status("status reply", reply(type, code));
-  status("INFO refused", reply(net::kInfo, random.between(1, 5)));
-  status("COUNTERS refused", reply(net::kCounters, random.between(1, 5)));
-  status("unknown type refused", reply(0, net::kBadMessage));
-  status("type 0x0c refused", reply(0x0c, net::kBadMessage));
-  status("unknown type refused", reply(static_cast<uint8_t>(random.between(0x0d, 0x7f)), net::kBadMessage));
-  all.push_back(opaque("unknown reply", false, reply(static_cast<uint8_t>(random.between(0x0d, 0x7f)), net::kOk),
-                       net::kVersion, random.bytes(random.between(0, 9))));
-  {
+    all_.push_back(std::move(m));
+  }
+  void status_replies() {
+    for (const uint8_t type : {net::kOpen, net::kClose, net::kStatus, net::kTable, net::kStart, net::kWrite, net::kRead,
+                               net::kRelease, net::kSet})
+      for (int code = 0; code <= 6; ++code) status("status reply", reply(type, code));
+    status("INFO refused", reply(net::kInfo, random_.between(1, 5)));
+    status("COUNTERS refused", reply(net::kCounters, random_.between(1, 5)));
+    status("unknown type refused", reply(0, net::kBadMessage));
+    status("type 0x0c refused", reply(0x0c, net::kBadMessage));
+    status("unknown type refused", reply(static_cast<uint8_t>(random_.between(0x0d, 0x7f)), net::kBadMessage));
+  }
+  void other_replies() {
+    all_.push_back(opaque("unknown reply", false, reply(static_cast<uint8_t>(random_.between(0x0d, 0x7f)), net::kOk),
+                          net::kVersion, random_.bytes(random_.between(0, 9))));
     net::Mac mac;
-    for (uint8_t& b : mac) b = static_cast<uint8_t>(random.bits(8));
-    all.push_back(info_reply(reply(net::kInfo, net::kOk), layout ? *layout : random_config(random), mac,
-                             random.bits(32), random.words(4)));
+    for (uint8_t& b : mac) b = static_cast<uint8_t>(random_.bits(8));
+    all_.push_back(info_reply(reply(net::kInfo, net::kOk), layout_ ? *layout_ : random_config(random_), mac,
+                              random_.bits(32), random_.words(4)));
+    all_.push_back(counters_reply(reply(net::kCounters, net::kOk), random_.words(net::kCounterWords)));
   }
-  all.push_back(counters_reply(reply(net::kCounters, net::kOk), random.words(net::kCounterWords)));
-  {
-    const int cells = layout ? random.between(1, std::min(most, layout->chunk_cells())) : most;
-    const golden::Config format = layout ? layout->engine : golden::Config{};
-    all.push_back(map_packet(reply(0x0c, net::kOk), random_cells(random, format, cells), layout, -1));
-    if (layout && layout->cell_bytes() > 1)
-      all.push_back(map_packet(reply(0x0c, net::kOk), random_cells(random, format, cells), layout, -1,
-                               static_cast<size_t>(random.between(1, layout->cell_bytes() - 1))));
+  void map_packets() {
+    const int most = small_ ? 3 : 40;
+    const int cells = layout_ ? random_.between(1, std::min(most, layout_->chunk_cells())) : most;
+    const golden::Config format = layout_ ? layout_->engine : golden::Config{};
+    all_.push_back(map_packet(reply(0x0c, net::kOk), random_cells(random_, format, cells), layout_, -1));
+    if (layout_ && layout_->cell_bytes() > 1)
+      all_.push_back(map_packet(reply(0x0c, net::kOk), random_cells(random_, format, cells), layout_, -1,
+                                static_cast<size_t>(random_.between(1, layout_->cell_bytes() - 1))));
   }
-  return all;
+
+  Random& random_;
+  const Layout& layout_;
+  const bool small_;
+  std::vector<Message> all_;
+};
+std::vector<Message> messages_of_all_kinds(Random& random, const Layout& layout, bool small) {
+  return AllKinds(random, layout, small).messages();
 }
 
 // Each message in a conversation of its own: nobody asked for a reply, nobody answers a request.
@@ -533,7 +569,7 @@ class Script {
     h.tile = tile;
     h.index = index;
     Bytes b = net::encode(h);
-    b.insert(b.end(), payload.begin(), payload.end());
+    std::copy(payload.begin(), payload.end(), std::back_inserter(b));
     const long frame = trace.add(from, to, b);
     wanted[frame];
     return frame;
@@ -554,131 +590,149 @@ Bytes start_bytes(uint32_t threshold = 0) {
 
 }  // namespace
 
+namespace {
+
+// One conversation and what the dissector has to say of it.
+struct Conversation {
+  Script s;
+  static constexpr uint16_t tile = 3;
+
+  void repeated(long frame, long first, const char* expert) {
+    s.want(frame).repeats = first;
+    s.want(frame).experts.insert(expert);
+  }
+  void unanswered(long frame) { s.want(frame).experts.insert("no_response"); }
+
+  void session() {
+    const long open = s.ask(net::kOpen, 1, 0, 0, number(5));
+    s.want(open).info = "OPEN nonce 0x00000005";
+    s.pair(open, s.answer(net::kOpen, 1, net::kOk));
+    const long open_again = s.ask(net::kOpen, 2, 0, 0, number(5));
+    repeated(open_again, open, "repeated");
+    s.pair(open_again, s.answer(net::kOpen, 2, net::kOk));
+    unanswered(s.ask(net::kOpen, 3, 0, 0, number(6)));  // another nonce is another request
+
+    // STATUS is asked all the time; it is repeated where the one before is still open.
+    s.exchange(net::kStatus, 4);
+    const long first_status = s.ask(net::kStatus, 5, 0, 0, {});
+    const long second_status = s.ask(net::kStatus, 6, 0, 0, {});
+    repeated(second_status, first_status, "repeated");
+    s.want(second_status).info = "STATUS [repeated]";
+    s.pair(second_status, s.answer(net::kStatus, 6, net::kOk));
+    s.pair(first_status, s.answer(net::kStatus, 5, net::kOk));  // overtaken
+  }
+  void one_tile() {
+    const long start = s.ask(net::kStart, 7, tile, 0, start_bytes());
+    s.want(start).info = "START tile 3 table 1: 16x12 cells, window 36x26 in 2 chunks, 12 planes";
+    const long not_ready = s.answer(net::kStart, 7, net::kNotReady, tile);
+    s.pair(start, not_ready);
+    s.want(not_ready).experts.insert("code");
+    s.want(not_ready).info = "START not ready: no session";
+
+    const long silent = s.ask(net::kWrite, 8, tile, 0, Bytes(8, 1));  // nobody waits for an answer
+    s.want(silent).info = "WRITE tile 3 chunk 0";
+    const long write = s.ask(net::kWrite, 9, tile, 1, Bytes(8, 1), net::kFlagAnswer);
+    s.want(write).info = "WRITE tile 3 chunk 1, answer";
+    // The same packet twice on the wire: both replies belong to the first.
+    repeated(s.ask(net::kWrite, 9, tile, 1, Bytes(8, 1), net::kFlagAnswer), write, "repeated");
+    const long written = s.answer(net::kWrite, 9, net::kOk, tile, 1);
+    s.pair(write, written);
+    const long written_again = s.answer(net::kWrite, 9, net::kOk, tile, 1);
+    s.want(written_again).request_in = write;
+    repeated(written_again, written, "repeated_reply");
+
+    const long read = s.ask(net::kRead, 10, tile, 0, net::read_payload(40, 0));
+    s.want(read).info = "READ tile 3 chunks 0..39 keep 0";
+    s.pair(read, s.answer(net::kRead, 10, net::kOk, tile));
+    s.want(s.map(10, tile, 0)).request_in = read;
+    const long chunk = s.map(10, tile, 1);
+    s.want(chunk).request_in = read;
+    s.want(chunk).info = "MAP tile 3 chunk 1: 8 bytes";
+    const long chunk_again = s.map(10, tile, 1);
+    s.want(chunk_again).request_in = read;
+    repeated(chunk_again, chunk, "repeated_chunk");
+    const long rest = s.ask(net::kRead, 11, tile, 2, net::read_payload(38, 0));
+    unanswered(rest);
+    s.want(s.map(11, tile, 2)).request_in = rest;
+    const long rest_again = s.ask(net::kRead, 12, tile, 2, net::read_payload(8, 0));
+    repeated(rest_again, rest, "repeated");
+    s.pair(rest_again, s.answer(net::kRead, 12, net::kOk, tile, 2));
+  }
+  void release_and_set() {
+    const long release = s.ask(net::kRelease, 13, tile, 0, {});
+    s.pair(release, s.answer(net::kRelease, 13, net::kOk, tile));
+    const long release_again = s.ask(net::kRelease, 14, tile, 0, {});
+    repeated(release_again, release, "repeated");
+    const long refused = s.answer(net::kRelease, 14, net::kOrder, tile);
+    s.pair(release_again, refused);
+    s.want(refused).experts.insert("code");
+
+    const long half = s.ask(net::kSet, 15, 0, 0, number(net::kDuplexHalf));
+    s.want(half).info = "SET duplex half";
+    s.pair(half, s.answer(net::kSet, 15, net::kOk));
+    const long full = s.ask(net::kSet, 16, 0, 0, number(net::kDuplexFull));  // another value
+    s.pair(full, s.answer(net::kSet, 16, net::kOk));
+    const long full_again = s.ask(net::kSet, 17, 0, 0, number(net::kDuplexFull));
+    repeated(full_again, full, "repeated");
+    unanswered(full_again);
+  }
+  void strangers() {
+    // Answers to nobody: no such sequence, another type, a map packet to what was no READ.
+    for (const long frame :
+         {s.answer(net::kStatus, 99, net::kOk), s.answer(net::kStatus, 16, net::kOk), s.map(13, tile, 9)})
+      s.want(frame).experts.insert("no_request");
+
+    // A packet doubled on the wire, of those that are asked all the time.
+    const Bytes zeros(net::kInfoRequestBytes - net::kHeaderBytes, 0);
+    const long info = s.ask(net::kInfo, 20, 0, 0, zeros);
+    repeated(s.ask(net::kInfo, 20, 0, 0, zeros), info, "repeated");
+    const long told = s.answer(net::kInfo, 20, net::kBadMessage);
+    s.pair(info, told);
+    s.want(told).experts.insert("code");
+    const long later = s.ask(net::kInfo, 21, 0, 0, zeros);
+    const long told_later = s.answer(net::kInfo, 21, net::kBadMessage);
+    s.pair(later, told_later);
+    s.want(told_later).experts.insert("code");
+
+    // Another session, another host: the same numbers are other requests.
+    s.token = 0xcafe0002;
+    unanswered(s.ask(net::kStart, 30, tile, 0, start_bytes()));
+    s.token = 0xcafe0001;
+    s.host = host_port(40001);
+    const long other = s.ask(net::kStart, 7, tile, 0, start_bytes());
+    s.pair(other, s.answer(net::kStart, 7, net::kOk, tile));
+    s.want(other + 1).info = "START ok: no session";
+    s.host = host_port(40000);
+    // Half of all tile numbers later this one is new.
+    unanswered(s.ask(net::kStart, 31, static_cast<uint16_t>(tile + 32768), 0, start_bytes()));
+    unanswered(s.ask(net::kStart, 32, tile, 0, start_bytes()));
+
+    // Long after it, the same number is another request, not the same packet twice.
+    const long early = s.ask(net::kSet, 40, 0, 0, number(net::kDuplexByPin));
+    s.pair(early, s.answer(net::kSet, 40, net::kOk));
+    for (uint16_t i = 0; i < 300; ++i) {
+      const auto n = static_cast<uint16_t>(1000 + i);
+      s.ask(net::kWrite, n, tile, n, {0});
+    }
+    const long late = s.ask(net::kSet, 40, 0, 0, number(net::kDuplexByPin));
+    repeated(late, early, "repeated");
+    s.pair(late, s.answer(net::kSet, 40, net::kOk));
+  }
+};
+
+}  // namespace
+
 TEST_CASE("dissector: replies find their requests, repetitions the first of them") {
   if (skipped()) return;
   TemporaryDir dir;
-  Script s;
-  const uint16_t tile = 3;
-  auto repeated = [&](long frame, long first, const char* expert) {
-    s.want(frame).repeats = first;
-    s.want(frame).experts.insert(expert);
-  };
-  auto unanswered = [&](long frame) { s.want(frame).experts.insert("no_response"); };
-
-  const long open = s.ask(net::kOpen, 1, 0, 0, number(5));
-  s.want(open).info = "OPEN nonce 0x00000005";
-  s.pair(open, s.answer(net::kOpen, 1, net::kOk));
-  const long open_again = s.ask(net::kOpen, 2, 0, 0, number(5));
-  repeated(open_again, open, "repeated");
-  s.pair(open_again, s.answer(net::kOpen, 2, net::kOk));
-  unanswered(s.ask(net::kOpen, 3, 0, 0, number(6)));  // another nonce is another request
-
-  // STATUS is asked all the time; it is repeated where the one before is still open.
-  s.exchange(net::kStatus, 4);
-  const long first_status = s.ask(net::kStatus, 5, 0, 0, {});
-  const long second_status = s.ask(net::kStatus, 6, 0, 0, {});
-  repeated(second_status, first_status, "repeated");
-  s.want(second_status).info = "STATUS [repeated]";
-  s.pair(second_status, s.answer(net::kStatus, 6, net::kOk));
-  s.pair(first_status, s.answer(net::kStatus, 5, net::kOk));  // overtaken
-
-  const long start = s.ask(net::kStart, 7, tile, 0, start_bytes());
-  s.want(start).info = "START tile 3 table 1: 16x12 cells, window 36x26 in 2 chunks, 12 planes";
-  const long not_ready = s.answer(net::kStart, 7, net::kNotReady, tile);
-  s.pair(start, not_ready);
-  s.want(not_ready).experts.insert("code");
-  s.want(not_ready).info = "START not ready: no session";
-
-  const long silent = s.ask(net::kWrite, 8, tile, 0, Bytes(8, 1));  // nobody waits for an answer
-  s.want(silent).info = "WRITE tile 3 chunk 0";
-  const long write = s.ask(net::kWrite, 9, tile, 1, Bytes(8, 1), net::kFlagAnswer);
-  s.want(write).info = "WRITE tile 3 chunk 1, answer";
-  // The same packet twice on the wire: both replies belong to the first.
-  repeated(s.ask(net::kWrite, 9, tile, 1, Bytes(8, 1), net::kFlagAnswer), write, "repeated");
-  const long written = s.answer(net::kWrite, 9, net::kOk, tile, 1);
-  s.pair(write, written);
-  const long written_again = s.answer(net::kWrite, 9, net::kOk, tile, 1);
-  s.want(written_again).request_in = write;
-  repeated(written_again, written, "repeated_reply");
-
-  const long read = s.ask(net::kRead, 10, tile, 0, net::read_payload(40, 0));
-  s.want(read).info = "READ tile 3 chunks 0..39 keep 0";
-  s.pair(read, s.answer(net::kRead, 10, net::kOk, tile));
-  s.want(s.map(10, tile, 0)).request_in = read;
-  const long chunk = s.map(10, tile, 1);
-  s.want(chunk).request_in = read;
-  s.want(chunk).info = "MAP tile 3 chunk 1: 8 bytes";
-  const long chunk_again = s.map(10, tile, 1);
-  s.want(chunk_again).request_in = read;
-  repeated(chunk_again, chunk, "repeated_chunk");
-  const long rest = s.ask(net::kRead, 11, tile, 2, net::read_payload(38, 0));
-  unanswered(rest);
-  s.want(s.map(11, tile, 2)).request_in = rest;
-  const long rest_again = s.ask(net::kRead, 12, tile, 2, net::read_payload(8, 0));
-  repeated(rest_again, rest, "repeated");
-  s.pair(rest_again, s.answer(net::kRead, 12, net::kOk, tile, 2));
-
-  const long release = s.ask(net::kRelease, 13, tile, 0, {});
-  s.pair(release, s.answer(net::kRelease, 13, net::kOk, tile));
-  const long release_again = s.ask(net::kRelease, 14, tile, 0, {});
-  repeated(release_again, release, "repeated");
-  const long refused = s.answer(net::kRelease, 14, net::kOrder, tile);
-  s.pair(release_again, refused);
-  s.want(refused).experts.insert("code");
-
-  const long half = s.ask(net::kSet, 15, 0, 0, number(net::kDuplexHalf));
-  s.want(half).info = "SET duplex half";
-  s.pair(half, s.answer(net::kSet, 15, net::kOk));
-  const long full = s.ask(net::kSet, 16, 0, 0, number(net::kDuplexFull));  // another value
-  s.pair(full, s.answer(net::kSet, 16, net::kOk));
-  const long full_again = s.ask(net::kSet, 17, 0, 0, number(net::kDuplexFull));
-  repeated(full_again, full, "repeated");
-  unanswered(full_again);
-
-  // Answers to nobody: no such sequence, another type, a map packet to what was no READ.
-  for (const long frame :
-       {s.answer(net::kStatus, 99, net::kOk), s.answer(net::kStatus, 16, net::kOk), s.map(13, tile, 9)})
-    s.want(frame).experts.insert("no_request");
-
-  // A packet doubled on the wire, of those that are asked all the time.
-  const Bytes zeros(net::kInfoRequestBytes - net::kHeaderBytes, 0);
-  const long info = s.ask(net::kInfo, 20, 0, 0, zeros);
-  repeated(s.ask(net::kInfo, 20, 0, 0, zeros), info, "repeated");
-  const long told = s.answer(net::kInfo, 20, net::kBadMessage);
-  s.pair(info, told);
-  s.want(told).experts.insert("code");
-  const long later = s.ask(net::kInfo, 21, 0, 0, zeros);
-  const long told_later = s.answer(net::kInfo, 21, net::kBadMessage);
-  s.pair(later, told_later);
-  s.want(told_later).experts.insert("code");
-
-  // Another session, another host: the same numbers are other requests.
-  s.token = 0xcafe0002;
-  unanswered(s.ask(net::kStart, 30, tile, 0, start_bytes()));
-  s.token = 0xcafe0001;
-  s.host = host_port(40001);
-  const long other = s.ask(net::kStart, 7, tile, 0, start_bytes());
-  s.pair(other, s.answer(net::kStart, 7, net::kOk, tile));
-  s.want(other + 1).info = "START ok: no session";
-  s.host = host_port(40000);
-  // Half of all tile numbers later this one is new.
-  unanswered(s.ask(net::kStart, 31, static_cast<uint16_t>(tile + 32768), 0, start_bytes()));
-  unanswered(s.ask(net::kStart, 32, tile, 0, start_bytes()));
-
-  // Long after it, the same number is another request, not the same packet twice.
-  const long early = s.ask(net::kSet, 40, 0, 0, number(net::kDuplexByPin));
-  s.pair(early, s.answer(net::kSet, 40, net::kOk));
-  for (uint16_t i = 0; i < 300; ++i) {
-    const auto n = static_cast<uint16_t>(1000 + i);
-    s.ask(net::kWrite, n, tile, n, {0});
-  }
-  const long late = s.ask(net::kSet, 40, 0, 0, number(net::kDuplexByPin));
-  repeated(late, early, "repeated");
-  s.pair(late, s.answer(net::kSet, 40, net::kOk));
-
-  s.check(dir, true);
-  s.check(dir, true, "-Y psweep");
-  s.check(dir, false);
+  Conversation c;
+  c.session();
+  c.one_tile();
+  c.release_and_set();
+  c.strangers();
+  c.s.check(dir, true);
+  c.s.check(dir, true, "-Y psweep");
+  c.s.check(dir, false);
 }
 
 TEST_CASE("dissector: an INFO reply helps packets before it in two passes, those of its own chip only") {
@@ -906,12 +960,117 @@ Message rebuilt(const Bytes& b, bool request, const Layout& layout, int threshol
 
 }  // namespace
 
-TEST_CASE("dissector: a session of the simulated chip, every field of every packet, every request and its reply") {
-  if (skipped()) return;
-  const bool faults = GENERATE(false, true);
-  TemporaryDir dir;
-  const std::string pcap = (dir / "wire.pcap").string();
-  const chip::Chip& chip = chip::chip_named("tiny");
+namespace {
+
+// What one host's conversation with sequence numbers that do not come again makes of requests and replies.
+class Bookkeeping {
+ public:
+  Bookkeeping(const net::ArbiterConfig& chip, int threshold) : chip_(chip), job_threshold_(threshold) {}
+
+  void add(long frame, uint64_t ns, const Bytes& b, bool request) {
+    INFO("frame " << frame);
+    Message m = rebuilt(b, request, layout_, threshold_);
+    REQUIRE(m.bytes == b);
+    const net::Header& h = m.header;
+    types.insert(h.type);
+    payloads[frame] = b;
+    times_[frame] = ns;
+    Expectation& e = expected[frame] = m.expect();
+    std::string key = std::to_string(h.token) + "/" + std::to_string(h.type) + "/" + std::to_string(h.tile) + "/" +
+                      std::to_string(h.index);
+    if (h.type == net::kOpen || h.type == net::kSet) key += "/" + std::to_string(net::get32(b, net::kHeaderBytes));
+    const long repeats = request ? asked(frame, m, key) : told(frame, h, key, e);
+    if (repeats == 0) return;
+    e.generated("psweep.repeats", std::to_string(repeats));
+    if (request) e.experts.insert("repeated");
+  }
+  // At the end: which reply came, and which did not.
+  void close() {
+    for (const Sent& q : sent) {
+      if (q.reply != 0) {
+        expected[q.frame].generated("psweep.response_in", std::to_string(q.reply));
+      } else if (q.wanted) {
+        expected[q.frame].experts.insert("no_response");
+        ++unanswered;
+      }
+    }
+  }
+
+  struct Sent {
+    long frame;
+    bool wanted;
+    net::Header h;
+    long reply = 0;
+  };
+  std::vector<Sent> sent;
+  std::map<long, Expectation> expected;
+  std::map<long, Bytes> payloads;
+  std::set<uint8_t> types;
+  int unanswered = 0;
+
+ private:
+  // The frame that a request repeats, or 0.
+  long asked(long frame, const Message& m, const std::string& key) {
+    const net::Header& h = m.header;
+    const bool polled = h.type == net::kInfo || h.type == net::kCounters || h.type == net::kStatus;
+    long repeats = 0;
+    const auto same = by_sequence_.find(h.sequence);
+    if (same != by_sequence_.end()) {
+      if (polled) repeats = sent[same->second].frame;
+    } else {
+      by_sequence_[h.sequence] = sent.size();
+      sent.push_back({frame, m.wanted, h});
+      const auto before = latest_.find(h.type);
+      if (polled && before != latest_.end() && sent[before->second].reply == 0) repeats = sent[before->second].frame;
+      latest_[h.type] = sent.size() - 1;
+    }
+    if (!polled) {
+      const auto [hit, is_new] = first_.insert({key, frame});
+      if (!is_new) repeats = hit->second;
+    }
+    if (h.type == net::kStart) threshold_ = job_threshold_;
+    return repeats;
+  }
+  // The frame that a reply repeats, or 0.
+  long told(long frame, const net::Header& h, const std::string& key, Expectation& e) {
+    const auto hit = by_sequence_.find(h.sequence);
+    REQUIRE(hit != by_sequence_.end());  // everything the chip says answers something
+    Sent& question = sent[hit->second];
+    const bool map = h.type == net::kMap;
+    REQUIRE(h.type == (map ? net::kMap : question.h.type | net::kReply));
+    if (map) REQUIRE(question.h.type == net::kRead);
+    e.generated("psweep.request_in", std::to_string(question.frame));
+    const uint64_t ns = times_[frame] - times_[question.frame];
+    char time[40];
+    std::snprintf(time, sizeof time, "%d.%09d", static_cast<int>(ns / 1'000'000'000),
+                  static_cast<int>(ns % 1'000'000'000));
+    e.generated("psweep.response_time", time);
+    if (h.type == (net::kInfo | net::kReply)) layout_ = chip_;
+    if (map) {
+      const auto [chunk, is_new] = first_.insert({key, frame});
+      if (!is_new) e.experts.insert("repeated_chunk");
+      return is_new ? 0 : chunk->second;
+    }
+    if (question.reply != 0) {
+      e.experts.insert("repeated_reply");
+      return question.reply;
+    }
+    question.reply = frame;
+    return 0;
+  }
+
+  const net::ArbiterConfig chip_;
+  const int job_threshold_;
+  std::map<uint16_t, size_t> by_sequence_;
+  std::map<std::string, long> first_;  // of a request or map chunk, by what makes it itself
+  std::map<uint8_t, size_t> latest_;
+  std::map<long, uint64_t> times_;
+  Layout layout_;
+  int threshold_ = -1;
+};
+
+// Six tiles through the simulated chip, recorded; the capabilities that it told, and the tiles' threshold.
+std::pair<net::ArbiterConfig, int> record_session(const chip::Chip& chip, bool faults, const std::string& pcap) {
   chip::DeskSettings settings;
   settings.clk_mhz = 30;  // the fewer clocks, the sooner it is over
   settings.seed = test_seed();
@@ -937,111 +1096,41 @@ TEST_CASE("dissector: a session of the simulated chip, every field of every pack
   REQUIRE(done == 6);
   desk.run_for(chip::kMillisecond);
   desk.finish();
+  return {capabilities.config, s.job.threshold};
+}
+
+}  // namespace
+
+TEST_CASE("dissector: a session of the simulated chip, every field of every packet, every request and its reply") {
+  if (skipped()) return;
+  const bool faults = GENERATE(false, true);
+  TemporaryDir dir;
+  const std::string pcap = (dir / "wire.pcap").string();
+  const chip::Chip& chip = chip::chip_named("tiny");
+  const auto [config, threshold] = record_session(chip, faults, pcap);
 
   const auto frames = read_pcap(pcap);
   const auto got = Tshark(dir).dissect(pcap);
   REQUIRE(got.size() == frames.size());
-  struct Sent {
-    long frame;
-    bool wanted;
-    net::Header h;
-    long reply = 0;
-  };
-  std::vector<Sent> sent;
-  std::map<uint16_t, size_t> by_sequence;
-  std::map<std::string, long> first;  // of a request or map chunk, by what makes it itself
-  std::map<uint8_t, size_t> latest;
-  std::map<long, Expectation> expected;
-  std::map<long, Bytes> payloads;
-  std::set<uint8_t> types;
-  Layout layout;
-  int threshold = -1;
+  Bookkeeping book(config, threshold);
   for (size_t i = 0; i < frames.size(); ++i) {
-    const long frame = static_cast<long>(i) + 1;
     const auto packet = net::parse_udp(frames[i].frame);
-    if (!packet) {
-      CHECK_FALSE(got[i].psweep);
-      continue;
-    }
-    const Bytes& b = packet->payload;
-    const bool request = packet->to.port == chip.address.port;
-    INFO("frame " << frame);
-    Message m = rebuilt(b, request, layout, threshold);
-    REQUIRE(m.bytes == b);
-    const net::Header& h = m.header;
-    types.insert(h.type);
-    payloads[frame] = b;
-    Expectation& e = expected[frame] = m.expect();
-    // The rest is the bookkeeping of one host's conversation with sequence numbers that do not come again.
-    std::string key = std::to_string(h.token) + "/" + std::to_string(h.type) + "/" + std::to_string(h.tile) + "/" +
-                      std::to_string(h.index);
-    if (h.type == net::kOpen || h.type == net::kSet) key += "/" + std::to_string(net::get32(b, net::kHeaderBytes));
-    long repeats = 0;
-    const bool polled = h.type == net::kInfo || h.type == net::kCounters || h.type == net::kStatus;
-    if (request) {
-      const auto same = by_sequence.find(h.sequence);
-      if (same != by_sequence.end()) {
-        if (polled) repeats = sent[same->second].frame;
-      } else {
-        by_sequence[h.sequence] = sent.size();
-        sent.push_back({frame, m.wanted, h});
-        const auto before = latest.find(h.type);
-        if (polled && before != latest.end() && sent[before->second].reply == 0) repeats = sent[before->second].frame;
-        latest[h.type] = sent.size() - 1;
-      }
-      if (!polled) {
-        const auto [hit, is_new] = first.insert({key, frame});
-        if (!is_new) repeats = hit->second;
-      }
-      if (h.type == net::kStart) threshold = s.job.threshold;
+    if (packet) {
+      book.add(static_cast<long>(i) + 1, frames[i].ns, packet->payload, packet->to.port == chip.address.port);
     } else {
-      const auto hit = by_sequence.find(h.sequence);
-      REQUIRE(hit != by_sequence.end());  // everything the chip says answers something
-      Sent& question = sent[hit->second];
-      const bool map = h.type == net::kMap;
-      REQUIRE(h.type == (map ? net::kMap : question.h.type | net::kReply));
-      if (map) REQUIRE(question.h.type == net::kRead);
-      e.generated("psweep.request_in", std::to_string(question.frame));
-      const uint64_t ns = frames[i].ns - frames[static_cast<size_t>(question.frame) - 1].ns;
-      char time[40];
-      std::snprintf(time, sizeof time, "%d.%09d", static_cast<int>(ns / 1'000'000'000),
-                    static_cast<int>(ns % 1'000'000'000));
-      e.generated("psweep.response_time", time);
-      if (map) {
-        const auto [chunk, is_new] = first.insert({key, frame});
-        if (!is_new) {
-          repeats = chunk->second;
-          e.experts.insert("repeated_chunk");
-        }
-      } else if (question.reply != 0) {
-        repeats = question.reply;
-        e.experts.insert("repeated_reply");
-      } else {
-        question.reply = frame;
-      }
-      if (h.type == (net::kInfo | net::kReply)) layout = capabilities.config;
-    }
-    if (repeats != 0) {
-      e.generated("psweep.repeats", std::to_string(repeats));
-      if (request) e.experts.insert("repeated");
+      CHECK_FALSE(got[i].psweep);
     }
   }
-  int unanswered = 0, repeated = 0;
-  for (const Sent& q : sent) {
-    if (q.reply != 0) {
-      expected[q.frame].generated("psweep.response_in", std::to_string(q.reply));
-    } else if (q.wanted) {
-      expected[q.frame].experts.insert("no_response");
-      ++unanswered;
-    }
-  }
-  for (const auto& [frame, e] : expected) {
+  book.close();
+  int repeated = 0;
+  for (const auto& [frame, e] : book.expected) {
     repeated += e.experts.count("repeated") != 0;
-    check_frame(got[static_cast<size_t>(frame) - 1], e, payloads[frame], "type " + std::to_string(payloads[frame][3]));
+    check_frame(got[static_cast<size_t>(frame) - 1], e, book.payloads[frame],
+                "type " + std::to_string(book.payloads[frame][3]));
   }
-  INFO(sent.size() << " requests, " << unanswered << " without a reply, " << repeated << " repeated");
-  CHECK(sent.size() > 30);
-  CHECK(types.size() >= 17);
+  INFO(book.sent.size() << " requests, " << book.unanswered << " without a reply, " << repeated << " repeated");
+  CHECK(book.sent.size() > 30);
+  CHECK(book.types.size() >= 17);
   if (faults) CHECK(repeated > 0);
-  if (!faults) CHECK(unanswered == 0);
+  if (!faults) CHECK(book.unanswered == 0);
 }

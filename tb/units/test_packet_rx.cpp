@@ -329,30 +329,32 @@ TEMPLATE_TEST_CASE("packet_rx: every bit of the first 42 bytes matters as the mo
   }
 }
 
-TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in order counts", "", Vpacket_rx_2,
-                   Vpacket_rx_4) {
-  auto bench = std::make_unique<Bench<TestType>>();
-  struct Fault {
-    const char* name;
-    int counter;
-    std::function<void(Bytes&, uint8_t&)> make;
-    char kinds;  // of 'u', 'i', 'a'; '*' all, 'p' IP
-  };
-  enum { kHeaderSum = 1, kContentSum = 2 };
-  int broken = 0;  // sums that are wrong on purpose
+namespace {
+
+struct Fault {
+  const char* name;
+  int counter;
+  std::function<void(Bytes&, uint8_t&)> make;
+  char kinds;  // of 'u', 'i', 'a'; '*' all, 'p' IP
+
+  bool applies(char kind) const { return kinds == '*' || kinds == kind || (kinds == 'p' && kind != 'a'); }
+};
+enum { kHeaderSum = 1, kContentSum = 2 };
+
+// In the order of precedence. broken: sums that are wrong on purpose.
+std::vector<Fault> all_faults(const net::Address& address, int* broken) {
   auto verdict_bit = [](int n) { return [n](Bytes&, uint8_t& v) { v = static_cast<uint8_t>(v | 1 << n); }; };
   auto set = [](size_t at, uint8_t value) { return [at, value](Bytes& f, uint8_t&) { f[at] = value; }; };
   auto flip = [](size_t at, uint8_t mask) {
     return [at, mask](Bytes& f, uint8_t&) { f[at] = static_cast<uint8_t>(f[at] ^ mask); };
   };
   auto own_at = [&](size_t at, size_t bytes) {
-    return [&bench, at, bytes](Bytes& f, uint8_t&) {
-      const Bytes own = golden_own(bench->own);
+    return [address, at, bytes](Bytes& f, uint8_t&) {
+      const Bytes own = golden_own(address);
       std::copy_n(own.begin() + (bytes == 4 ? 6 : 0), bytes, f.begin() + static_cast<std::ptrdiff_t>(at));
     };
   };
-  // In the order of precedence.
-  const std::vector<Fault> faults = {
+  return {
       {"overflow", net::kRxOverflow, verdict_bit(5), '*'},
       {"rx_er", net::kRxError, verdict_bit(4), '*'},
       {"long", net::kRxLong, verdict_bit(3), '*'},
@@ -375,7 +377,7 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
       {"total length + 2048", net::kIpHeader, flip(16, 0x08), 'p'},
       {"total length beyond the frame", net::kIpHeader,
        [](Bytes& f, uint8_t&) { net::put16(f, 16, static_cast<uint32_t>(f.size() - 17)); }, 'p'},
-      {"IP checksum", net::kIpHeader, [&broken](Bytes&, uint8_t&) { broken |= kHeaderSum; }, 'p'},
+      {"IP checksum", net::kIpHeader, [broken](Bytes&, uint8_t&) { *broken |= kHeaderSum; }, 'p'},
       {"other IP", net::kIpHeader, flip(33, 0x40), 'p'},
       {"source MAC of a group", golden::kEventBadSource, flip(6, 0x01), '*'},
       {"source MAC our own", golden::kEventBadSource, own_at(6, 6), '*'},
@@ -399,28 +401,40 @@ TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in orde
       {"UDP length + 1", net::kChecksum, flip(39, 0x01), 'u'},
       {"UDP length + 256", net::kChecksum, flip(38, 0x01), 'u'},
       {"UDP length + 2048", net::kChecksum, flip(38, 0x08), 'u'},
-      {"checksum", net::kChecksum, [&broken](Bytes&, uint8_t&) { broken |= kContentSum; }, 'p'},
+      {"checksum", net::kChecksum, [broken](Bytes&, uint8_t&) { *broken |= kContentSum; }, 'p'},
   };
-  auto applies = [](char want, char kind) { return want == '*' || want == kind || (want == 'p' && kind != 'a'); };
+}
+
+// A good frame of a kind with one fault or two: where both touch a byte, the first in order stays.
+void spoil(Bytes& f, uint8_t& verdict, char kind, const Fault& first, const Fault& second, int& broken) {
+  verdict = 0;
+  broken = 0;
+  second.make(f, verdict);
+  if (&first != &second) first.make(f, verdict);
+  if (kind == 'a') return;
+  if (kind == 'i' || (f[40] | f[41])) repair_content(f);
+  if (broken & kContentSum) f[40] = static_cast<uint8_t>(f[40] ^ 0x10);
+  repair_header(f);
+  if (broken & kHeaderSum) f[25] = static_cast<uint8_t>(f[25] ^ 0x01);
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("packet_rx: all faults, alone and in pairs: the first in order counts", "", Vpacket_rx_2,
+                   Vpacket_rx_4) {
+  auto bench = std::make_unique<Bench<TestType>>();
+  int broken = 0;
+  const std::vector<Fault> faults = all_faults(bench->own, &broken);
   for (const char kind : {'u', 'i', 'a'}) {
     for (size_t a = 0; a < faults.size(); ++a) {
       for (size_t b = a; b < faults.size(); ++b) {
-        if (!applies(faults[a].kinds, kind) || !applies(faults[b].kinds, kind)) continue;
+        if (!faults[a].applies(kind) || !faults[b].applies(kind)) continue;
         Bytes f = bench->closed(kind == 'u' ? bench->udp(64) : kind == 'i' ? bench->icmp(65) : bench->arp());
         std::copy(bench->own.mac.begin(), bench->own.mac.end(), f.begin());  // no broadcast: that is ARP's alone
         uint8_t verdict = 0;
-        broken = 0;
-        faults[b].make(f, verdict);
-        if (b != a) faults[a].make(f, verdict);  // where both touch a byte, the first in order stays
-        if (kind != 'a') {
-          if (kind == 'i' || (f[40] | f[41])) repair_content(f);
-          if (broken & kContentSum) f[40] = static_cast<uint8_t>(f[40] ^ 0x10);
-          repair_header(f);
-          if (broken & kHeaderSum) f[25] = static_cast<uint8_t>(f[25] ^ 0x01);
-        }
-        const int counter = faults[a].counter;
+        spoil(f, verdict, kind, faults[a], faults[b], broken);
         INFO(kind << ": " << faults[a].name << " and " << faults[b].name);
-        bench->send(f, verdict, bit(counter));
+        bench->send(f, verdict, bit(faults[a].counter));
         bench->finish();
         REQUIRE(bench->outcomes.errors() == 0);
         REQUIRE(bench->events.errors() == 0);

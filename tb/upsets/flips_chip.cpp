@@ -325,24 +325,30 @@ struct Host {
 
   void on_reply(const net::Header& h, const Bytes& message, int64_t now, Wire& wire) {
     if (phase == Phase::kOpen) {
-      if (h.type != (net::kOpen | net::kReply)) return;
-      if (h.flags != net::kOk || h.token == 0) return;  // asked again
-      token = h.token;
-      ++sessions;
-      enter(Phase::kLook, now, wire);
-      return;
+      on_opened(h, now, wire);
+    } else if (phase == Phase::kClose) {
+      on_closed(h, now, wire);
+    } else if (h.token == token) {
+      on_status(h, message, now, wire);
     }
-    if (phase == Phase::kClose) {
-      if (h.type != (net::kClose | net::kReply)) return;
-      if (last_close) {
-        phase = Phase::kDone;
-      } else {
-        nonce = nonce * 69069 + 1;
-        enter(Phase::kOpen, now, wire);
-      }
-      return;
+  }
+  void on_opened(const net::Header& h, int64_t now, Wire& wire) {
+    if (h.type != (net::kOpen | net::kReply)) return;
+    if (h.flags != net::kOk || h.token == 0) return;  // asked again
+    token = h.token;
+    ++sessions;
+    enter(Phase::kLook, now, wire);
+  }
+  void on_closed(const net::Header& h, int64_t now, Wire& wire) {
+    if (h.type != (net::kClose | net::kReply)) return;
+    if (last_close) {
+      phase = Phase::kDone;
+    } else {
+      nonce = nonce * 69069 + 1;
+      enter(Phase::kOpen, now, wire);
     }
-    if (h.token != token) return;
+  }
+  void on_status(const net::Header& h, const Bytes& message, int64_t now, Wire& wire) {
     if (h.flags == net::kBusy || h.flags == net::kNoSession) {
       lost(now, wire);
       return;
@@ -352,80 +358,46 @@ struct Host {
     const auto s = net::parse_status(net::words_of(message, net::kHeaderBytes));
     if (!s || s->bitmap.size() != (static_cast<size_t>(work->config.slots()) + 31) / 32) return;
     if (phase == Phase::kLook) {
-      errors = s->errors;
-      error_count = s->error_count;
-      first = wanted;
-      base = 0;
-      for (size_t i = static_cast<size_t>(wanted); i < count(); ++i) maps[i].assign(work->tiles[i].map.size(), Bytes{});
-      enter(Phase::kTable, now, wire);
-      return;
-    }
-    if (s->has(net::kFlagFailed)) {
-      failed(now, wire);
+      on_look(*s, now, wire);
       return;
     }
     if (s->error_count < error_count) {
       error_count = s->error_count;
       errors = s->errors;
     }
-    if (s->error_count > error_count || (s->errors & ~errors) != 0) {
+    if (s->has(net::kFlagFailed) || s->error_count > error_count || (s->errors & ~errors) != 0) {
       failed(now, wire);
       return;
     }
+    on_phase(h, *s, now, wire);
+  }
+  void on_look(const net::Status& s, int64_t now, Wire& wire) {
+    errors = s.errors;
+    error_count = s.error_count;
+    first = wanted;
+    base = 0;
+    for (size_t i = static_cast<size_t>(wanted); i < count(); ++i) maps[i].assign(work->tiles[i].map.size(), Bytes{});
+    enter(Phase::kTable, now, wire);
+  }
+  void on_phase(const net::Header& h, const net::Status& s, int64_t now, Wire& wire) {
     const int type = h.type & 0x7f;
     switch (phase) {
       case Phase::kTable:
-        if (type != net::kTable) return;
-        if (h.flags == net::kOrder) {
-          lost(now, wire);
-        } else if (h.flags == net::kOk) {
-          base += static_cast<uint32_t>(work->config.chunk_bytes) / 4;
-          if (static_cast<size_t>(base) * 4 < work->table.size()) {
-            enter(Phase::kTable, now, wire);
-          } else {
-            upload = wanted;
-            enter(Phase::kStart, now, wire);
-          }
-        }
+        if (type == net::kTable) on_table(h, now, wire);
         break;
       case Phase::kStart:
-        if (type != net::kStart) return;
-        if (h.flags == net::kOrder) {
-          lost(now, wire);
-        } else if (h.flags == net::kOk) {
-          known.assign(tile(upload).rows.size(), false);
-          base = 0;
-          enter(Phase::kRows, now, wire);
-        }
+        if (type == net::kStart) on_start(h, now, wire);
         break;
-      case Phase::kRows: {
-        if (h.flags == net::kOrder) {
-          lost(now, wire);
-          return;
-        }
-        if (s->row_tile != number(upload)) return;
-        base = std::max<uint32_t>(base, s->base);
-        bool more = false, all = true;
-        for (size_t i = 0; i < known.size(); ++i) {
-          if (!known[i] && (!s->has(net::kFlagRows) || s->chunk(static_cast<uint32_t>(i)))) known[i] = more = true;
-          all = all && known[i];
-        }
-        if (all) {
-          enter(upload == wanted ? Phase::kRead : Phase::kMap, now, wire);
-          arrived(now, wire);
-        } else if (more) {
-          enter(Phase::kRows, now, wire);
-        }
+      case Phase::kRows:
+        on_rows(h, s, now, wire);
         break;
-      }
       case Phase::kRead:
-        if (type != net::kRead) return;
-        after_read(now, wire);
+        if (type == net::kRead) after_read(now, wire);
         break;
       case Phase::kMap:
         // Cells are there, and none come.
-        if (type == net::kStatus && now - map_heard > kPatience && s->has(net::kFlagMap) &&
-            s->map_tile == number(wanted)) {
+        if (type == net::kStatus && now - map_heard > kPatience && s.has(net::kFlagMap) &&
+            s.map_tile == number(wanted)) {
           ++resent;
           phase = Phase::kRead;
           ask(now, wire);
@@ -433,28 +405,70 @@ struct Host {
         }
         break;
       case Phase::kCheck:
-        if (type != net::kStatus) return;
-        if (!s->has(net::kFlagMapComplete)) return;
-        if (s->cells == tile(wanted).cells) {
+        if (type != net::kStatus || !s.has(net::kFlagMapComplete)) return;
+        if (s.cells == tile(wanted).cells) {
           enter(Phase::kRelease, now, wire);
         } else {
           failed(now, wire);
         }
         break;
       case Phase::kRelease:
-        if (type != net::kRelease || (h.flags != net::kOk && h.flags != net::kOrder)) return;
-        ++wanted;
-        tries = fruitless = 0;
-        if (static_cast<size_t>(wanted) == count()) {
-          last_close = true;
-          closes = 0;
-          enter(Phase::kClose, now, wire);
-        } else {
-          enter(Phase::kRead, now, wire);
-        }
+        if (type == net::kRelease && (h.flags == net::kOk || h.flags == net::kOrder)) on_released(now, wire);
         break;
       default:
         break;
+    }
+  }
+  void on_table(const net::Header& h, int64_t now, Wire& wire) {
+    if (h.flags == net::kOrder) {
+      lost(now, wire);
+    } else if (h.flags == net::kOk) {
+      base += static_cast<uint32_t>(work->config.chunk_bytes) / 4;
+      if (static_cast<size_t>(base) * 4 < work->table.size()) {
+        enter(Phase::kTable, now, wire);
+      } else {
+        upload = wanted;
+        enter(Phase::kStart, now, wire);
+      }
+    }
+  }
+  void on_start(const net::Header& h, int64_t now, Wire& wire) {
+    if (h.flags == net::kOrder) {
+      lost(now, wire);
+    } else if (h.flags == net::kOk) {
+      known.assign(tile(upload).rows.size(), false);
+      base = 0;
+      enter(Phase::kRows, now, wire);
+    }
+  }
+  void on_rows(const net::Header& h, const net::Status& s, int64_t now, Wire& wire) {
+    if (h.flags == net::kOrder) {
+      lost(now, wire);
+      return;
+    }
+    if (s.row_tile != number(upload)) return;
+    base = std::max<uint32_t>(base, s.base);
+    bool more = false, all = true;
+    for (size_t i = 0; i < known.size(); ++i) {
+      if (!known[i] && (!s.has(net::kFlagRows) || s.chunk(static_cast<uint32_t>(i)))) known[i] = more = true;
+      all = all && known[i];
+    }
+    if (all) {
+      enter(upload == wanted ? Phase::kRead : Phase::kMap, now, wire);
+      arrived(now, wire);
+    } else if (more) {
+      enter(Phase::kRows, now, wire);
+    }
+  }
+  void on_released(int64_t now, Wire& wire) {
+    ++wanted;
+    tries = fruitless = 0;
+    if (static_cast<size_t>(wanted) == count()) {
+      last_close = true;
+      closes = 0;
+      enter(Phase::kClose, now, wire);
+    } else {
+      enter(Phase::kRead, now, wire);
     }
   }
   void after_read(int64_t now, Wire& wire) {
