@@ -141,8 +141,8 @@ function(rtl_model name)
     COMMAND
       ${CMAKE_COMMAND} -D GHDL=${PSWEEP_GHDL} -D STANDARD=${PSWEEP_VHDL_STANDARD} -D TOP=${A_TOP} -D
       SOURCES=${source_list} -D GENERICS=${generic_list} -D DIR=${dir} -D BOTH_EDGES=${A_BOTH_EDGES}
-      -D AS_SYNTHESIZED=${A_AS_SYNTHESIZED} -D UPSETS=${upsets} -D SITES=${dir}/${name}.inc -D PYTHON=${PSWEEP_PYTHON} -P
-      ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
+      -D AS_SYNTHESIZED=${A_AS_SYNTHESIZED} -D UPSETS=${upsets} -D SITES=${dir}/${name}.inc -D PYTHON=${PSWEEP_PYTHON}
+      -P ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake
     DEPENDS ${sources} ${PSWEEP_RTL_MODEL_DIR}/VhdlToVerilog.cmake ${PSWEEP_RTL_MODEL_DIR}/EditedSources.cmake
             ${upset_tool}
     COMMENT "GHDL ${name}"

@@ -30,8 +30,8 @@ function(run_ghdl)
 endfunction()
 set(models ${SOURCES})
 if(NOT AS_SYNTHESIZED)
-  edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on" "\\1"
-                 "-- collision:" ${SOURCES})
+  edited_sources(models ${DIR} "-- synthesis translate_off\n *-- collision:[^\n]*\n([^-]*)-- synthesis translate_on"
+                 "\\1" "-- collision:" ${SOURCES})
 endif()
 run_ghdl(OUTPUT ${DIR}/analysis.log ARGS -a ${STANDARD} --workdir=${DIR} ${models})
 run_ghdl(OUTPUT ${DIR}/raw.v ARGS --synth ${STANDARD} --workdir=${DIR} ${GENERICS} --out=verilog ${TOP})

@@ -31,6 +31,7 @@ CHECKS: dict[str, Check] = {
     "arrows": programs.check_arrows,
     "trace": trace, "verilog": converted.check_verilog, "format": programs.check_format,
     "shell": programs.check_shell, "python": programs.check_python, "types": programs.check_types,
+    "length": programs.check_length,
 }
 
 

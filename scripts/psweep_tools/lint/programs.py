@@ -122,6 +122,12 @@ def check_python(tree: Tree) -> list[str]:
                 *tree.select(r"\.py$"))
 
 
+def check_length(tree: Tree) -> list[str]:
+    """lizard: no function of C++ or Python of more than 100 lines."""
+    sources = tree.select(r"^(sw|tb|scripts)/.*\.(cpp|hpp|py)$")
+    return _run(tree, _python_tool("lizard"), "--length", "100", "--CCN", "1000", "--warnings_only", *sources)
+
+
 def check_types(tree: Tree) -> list[str]:
     """mypy --strict on the package of the tools (.mypy.ini)."""
     return _run(tree, _python_tool("mypy"), "--no-error-summary", "--cache-dir=/dev/null")
