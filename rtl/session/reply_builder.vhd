@@ -4,8 +4,8 @@
 --               its READ's, with the chunk. From the frame, or from the session's memory
 --   Body      : status block and bitmap, capabilities, counters, or cells of the map, which pass by
 --   ICMP      : words 0 and 1, whose first and last bytes are the frame's, and the zero of the header
---   Rate      : a byte in 5 clocks (of the bitmap 11): its number goes out in C_ST_FETCH, it is shown in C_ST_SHOW; cells
---               one a clock
+--   Rate      : a byte in 5 clocks (of the bitmap 11): its number goes out in C_ST_FETCH, it is shown in C_ST_SHOW;
+--               cells one a clock
 --   Reset     : none; every reply begins in C_ST_IDLE
 --   Golden    : sw/golden/reply_builder.hpp
 library ieee;
