@@ -9,8 +9,8 @@
 #include "Vchunk_check_64.h"
 #include "Vchunk_check_704.h"
 #include "golden/chunk_check.hpp"
-#include "support/catch.hpp"
 #include "simulator/coverage.hpp"
+#include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;

@@ -7,8 +7,8 @@
 #include "Vinfo_rom.h"
 #include "Vinfo_rom_odd.h"
 #include "golden/info_rom.hpp"
-#include "support/catch.hpp"
 #include "simulator/coverage.hpp"
+#include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;

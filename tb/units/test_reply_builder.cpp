@@ -8,8 +8,8 @@
 #include "Vreply_builder.h"
 #include "Vreply_builder_5.h"
 #include "golden/reply_builder.hpp"
-#include "support/catch.hpp"
 #include "simulator/coverage.hpp"
+#include "support/catch.hpp"
 #include "support/scoreboard.hpp"
 
 using namespace psweep;
